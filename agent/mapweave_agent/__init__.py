@@ -1,0 +1,1 @@
+"""A robot: source, mapper, publisher; peers' maps, fusion, alignments."""

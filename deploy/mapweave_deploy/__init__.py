@@ -1,0 +1,1 @@
+"""Launching a team on one machine: the router, the simulated worlds, the processes."""

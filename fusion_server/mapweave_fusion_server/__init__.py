@@ -1,0 +1,1 @@
+"""The coordinator: maps and alignments in, numbered joint maps out."""

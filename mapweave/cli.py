@@ -1,0 +1,83 @@
+"""The program ``mapweave``: finds subcommands by entry point, runs one, reports errors in a line.
+
+Every installed package may contribute to the entry-point group ``mapweave.commands``; only the
+subcommand asked for is imported.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import entry_points, version
+
+from mapweave.errors import MapweaveError
+
+COMMAND_GROUP = "mapweave.commands"
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A subcommand.
+
+    Attributes
+    ----------
+    summary
+        One line for ``mapweave --help``.
+    configure
+        Adds the subcommand's arguments to its parser.
+    run
+        Does the work and returns the exit status.
+    """
+
+    summary: str
+    configure: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+def _overview(points: Sequence[str]) -> str:
+    commands = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
+    lines = [f"  {name:<8} {commands[name].load().summary}" for name in points]
+    return "usage: mapweave COMMAND …\n\n" + "\n".join(
+        ["Joint line maps of robot teams from raw 2D laser scans.", "", *lines, "",
+         "mapweave COMMAND --help tells more; mapweave --version."]
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit status: 0 done, 1 failed, 2 wrong usage."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    points = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
+    if words and words[0] == "--version":
+        print(f"mapweave {version('mapweave')}")  # noqa: T201
+        return 0
+    if not words or words[0] in ("-h", "--help"):
+        print(_overview(sorted(points)), file=sys.stdout if words else sys.stderr)  # noqa: T201
+        return 0 if words else EXIT_USAGE
+    if words[0] not in points:
+        known = ", ".join(sorted(points))
+        print(f"mapweave: no command {words[0]!r}; there are {known}", file=sys.stderr)  # noqa: T201
+        return EXIT_USAGE
+    command: Command = points[words[0]].load()
+    parser = argparse.ArgumentParser(prog=f"mapweave {words[0]}", description=command.summary)
+    command.configure(parser)
+    return _report(command, parser.parse_args(words[1:]))
+
+
+def _report(command: Command, options: argparse.Namespace) -> int:
+    """Run `command`; the one place where an error becomes a line and an exit status."""
+    try:
+        return command.run(options)
+    except MapweaveError as error:
+        print(f"mapweave: {error}", file=sys.stderr)  # noqa: T201
+        return EXIT_FAILED
+    except KeyboardInterrupt:
+        print("mapweave: interrupted", file=sys.stderr)  # noqa: T201
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our output has gone; Python would complain again when flushing at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILED

@@ -1,0 +1,44 @@
+"""What can go wrong, as exceptions that carry data; the command line turns them into one line."""
+
+from pathlib import Path
+
+
+class MapweaveError(Exception):
+    """Base of every error that mapweave raises on purpose; its text is one line for a person."""
+
+
+class FileError(MapweaveError):
+    """A file that cannot be used.
+
+    Parameters
+    ----------
+    path
+        The file.
+    problem
+        What is wrong with it, and what was expected.
+    """
+
+    def __init__(self, path: str | Path, problem: str) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = Path(path)
+        self.problem = problem
+
+
+class InvalidIdError(MapweaveError):
+    """A robot or team name that is not ``[a-z0-9][a-z0-9_-]{0,31}``."""
+
+    def __init__(self, kind: str, name: str) -> None:
+        super().__init__(
+            f"{kind} {name!r}: expected 1 to 32 characters, lower-case letters, digits, '_' or '-',"
+            " the first a letter or digit"
+        )
+        self.kind = kind
+        self.name = name
+
+
+class MissingExtraError(MapweaveError):
+    """An optional package that the asked-for output needs."""
+
+    def __init__(self, need: str, extra: str) -> None:
+        super().__init__(f"{need} needs an optional package: pip install 'mapweave[{extra}]'")
+        self.extra = extra

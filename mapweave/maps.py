@@ -1,0 +1,193 @@
+"""The maps: submaps, robot maps, alignments and joint maps, as immutable values.
+
+Words and formats: a *segment* is directed, its visible side on the left of its direction; a
+*submap* has a frame of its own; a *component* is a set of submaps whose relative pose is known.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from mapweave.arrays import FloatArray, IntArray
+
+Decision = Literal["accepted", "ambiguous", "refused"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """The poses of the scans of a submap, in its frame.
+
+    Attributes
+    ----------
+    scan_index
+        (m,) which scan of the log, from 0.
+    stamp
+        (m,) [s]; NaN where unknown.
+    pose
+        (m, 3) sensor poses [m, m, rad].
+    """
+
+    scan_index: IntArray
+    stamp: FloatArray
+    pose: FloatArray
+
+    @classmethod
+    def empty(cls) -> "Trajectory":
+        """Return a trajectory of no scans."""
+        return cls(np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineMap:
+    """Directed segments in one frame, grouped into generalized polylines (paper, V).
+
+    Attributes
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left; polyline by polyline, in their order.
+    polyline
+        (n,) to which generalized polyline each belongs: 0, 0, 1, 1, 1, 2, … ascending.
+    support
+        (n,) how many scans saw each.
+    free_space
+        Simple polygons, each (k, 2) [m], first vertex not repeated, without holes: what was seen
+        through. They may overlap.
+    """
+
+    segments: FloatArray
+    polyline: IntArray
+    support: IntArray
+    free_space: tuple[FloatArray, ...] = ()
+
+    @classmethod
+    def empty(cls) -> "LineMap":
+        """Return a map of nothing."""
+        return cls(np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+
+    @property
+    def polylines(self) -> list[FloatArray]:
+        """The (k, 4) segments of each generalized polyline."""
+        starts = np.flatnonzero(np.diff(self.polyline)) + 1
+        return np.split(self.segments, starts) if len(self.segments) else []
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Submap:
+    """What a robot mapped over a stretch of its path, in a frame of its own.
+
+    Attributes
+    ----------
+    id
+        Counts a robot's submaps from 0.
+    component
+        Submaps of one component have a known relative pose.
+    pose
+        (3,) of the submap's frame in the component's [m, m, rad].
+    map
+        Lines and free space, submap frame.
+    trajectory
+        Of the scans mapped here, submap frame.
+    """
+
+    id: int
+    component: int
+    pose: FloatArray
+    map: LineMap
+    trajectory: Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotMap:
+    """A robot's submaps with their poses.
+
+    Attributes
+    ----------
+    robot
+        The robot's id.
+    boot
+        Names this run of the robot; another run starts from nothing.
+    version
+        Grows with every change.
+    submaps
+        Ids ascending.
+    """
+
+    robot: str
+    boot: str
+    version: int
+    submaps: tuple[Submap, ...]
+
+    @property
+    def components(self) -> list[int]:
+        """The component numbers in use, ascending."""
+        return sorted({submap.component for submap in self.submaps})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Alignment:
+    """A rigid transform between two components, with its evidence.
+
+    Attributes
+    ----------
+    reference, other
+        Component names such as ``a/0``: component 0 of robot a.
+    transform
+        (3,) takes coordinates in `other` to coordinates in `reference` [m, m, rad].
+    decision
+        Accepted, ambiguous or refused.
+    confidence
+        Probability that the transform is right within 0.5 m and 5°.
+    reason
+        One sentence for a person.
+    evidence
+        The numbers behind the decision, by name.
+    runner_up
+        The best *different* hypothesis: ``{"transform": [x, y, theta], …numbers}``.
+    """
+
+    reference: str
+    other: str
+    transform: FloatArray
+    decision: Decision
+    confidence: float
+    reason: str
+    evidence: Mapping[str, float] = field(default_factory=dict)
+    runner_up: Mapping[str, object] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointComponent:
+    """Robots' components whose relative poses are known, merged into one line map.
+
+    Attributes
+    ----------
+    robots
+        Component name to its (3,) pose in the joint component's frame [m, m, rad].
+    confidence
+        That all of it hangs together rightly: of the weakest link needed.
+    map
+        The merged lines and the free space.
+    segment_confidence
+        (n,) for each segment of `map`, in [0, 1].
+    """
+
+    robots: Mapping[str, FloatArray]
+    confidence: float
+    map: LineMap
+    segment_confidence: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointMap:
+    """What the team knows, as a numbered immutable version."""
+
+    version: int
+    components: tuple[JointComponent, ...]
+    alignments: tuple[Alignment, ...]
+
+
+def component_name(robot: str, component: int) -> str:
+    """Return the name of a robot's component, such as ``a/0``."""
+    return f"{robot}/{component}"

@@ -1,0 +1,26 @@
+"""Names of robots and teams: one rule, because they become parts of keys and files."""
+
+import re
+
+from mapweave.errors import InvalidIdError
+
+ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,31}$"
+_ID = re.compile(ID_PATTERN + r"(?!\n)")
+
+
+def check_id(kind: str, name: str) -> str:
+    """Return `name` if it is a valid id, such as a robot's.
+
+    Parameters
+    ----------
+    kind
+        What it names, for the message: ``robot`` or ``team``.
+
+    Raises
+    ------
+    InvalidIdError
+        If it is not ``[a-z0-9][a-z0-9_-]{0,31}``.
+    """
+    if not _ID.fullmatch(name):
+        raise InvalidIdError(kind, name)
+    return name
