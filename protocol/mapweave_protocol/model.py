@@ -1,0 +1,28 @@
+"""What all messages have in common, and the kinds of names and numbers in them."""
+
+from typing import Annotated, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.names import ID_PATTERN
+
+MAX_COUNT = 2**53
+
+Id = Annotated[str, Field(pattern=ID_PATTERN, max_length=32)]
+Count = Annotated[int, Field(ge=0, le=MAX_COUNT)]
+Probability = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+Number = Annotated[float, Field(ge=-1e12, le=1e12, allow_inf_nan=False)]
+Label = Annotated[str, Field(min_length=1, max_length=64)]
+ComponentName = Annotated[str, Field(pattern=ID_PATTERN[:-1] + "/(0|[1-9][0-9]{0,4})$")]
+
+
+class WireModel(BaseModel):
+    """Part of a message: exactly these fields, of exactly these types."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Message(WireModel):
+    """A message; `format` names it and the version of its layout."""
+
+    format: ClassVar[str]
