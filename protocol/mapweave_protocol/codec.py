@@ -12,8 +12,7 @@ import msgpack
 from pydantic import ValidationError
 
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.messages import MAX_ALIGNMENTS
-from mapweave_protocol.model import Message
+from mapweave_protocol.model import MAX_ALIGNMENTS, Message
 
 MAX_PAYLOAD = 16 * 2**20  # [bytes]
 MAX_BODY = 64 * 2**20  # [bytes] decompressed

@@ -1,7 +1,10 @@
 """The parts of messages that hold geometry: submaps, lines, free space, trajectories, packed."""
 
+from functools import cached_property
+from hashlib import blake2b
 from typing import Self
 
+import msgpack
 import numpy as np
 from pydantic import Field, model_validator
 
@@ -17,6 +20,7 @@ MAX_SEGMENTS = 200_000  # of one line map
 MAX_VERTICES = 400_000  # of the free space of one line map
 MAX_SCANS = 100_000  # of one submap
 MAX_SUPPORT = 2**31
+DIGEST_SIZE = 8  # [bytes]
 MAX_BYTES = 8 * 2**20  # of one packed array
 
 
@@ -145,6 +149,11 @@ class PackedSubmap(WireModel):
         self.lines.unpack(SUBMAP_REACH)
         self.trajectory.unpack()
         return self
+
+    @cached_property
+    def digest(self) -> bytes:
+        """Tells apart the forms of a submap that still grows."""
+        return blake2b(msgpack.packb(self.model_dump()), digest_size=DIGEST_SIZE).digest()
 
     def unpack(self, component: int, pose: FloatArray) -> Submap:
         """Return the submap, with the `component` and ``(3,)`` `pose` given apart."""

@@ -4,9 +4,11 @@ from typing import Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from mapweave.arrays import FloatArray
 from mapweave.names import ID_PATTERN
 
 MAX_COUNT = 2**53
+MAX_ALIGNMENTS = 4096
 
 Id = Annotated[str, Field(pattern=ID_PATTERN, max_length=32)]
 Count = Annotated[int, Field(ge=0, le=MAX_COUNT)]
@@ -14,6 +16,7 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 Number = Annotated[float, Field(ge=-1e12, le=1e12, allow_inf_nan=False)]
 Label = Annotated[str, Field(min_length=1, max_length=64)]
 ComponentName = Annotated[str, Field(pattern=ID_PATTERN[:-1] + "/(0|[1-9][0-9]{0,4})$")]
+Transform = tuple[Number, Number, Number]
 
 
 class WireModel(BaseModel):
@@ -26,3 +29,9 @@ class Message(WireModel):
     """A message; `format` names it and the version of its layout."""
 
     format: ClassVar[str]
+
+
+def to_transform(pose: FloatArray) -> Transform:
+    """Return the ``(3,)`` `pose` [m, m, rad] as plain numbers."""
+    x, y, theta = (float(number) for number in pose)
+    return x, y, theta
