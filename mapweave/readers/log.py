@@ -1,8 +1,11 @@
 """The scans of a log, one after the other, in constant memory."""
 
 import re
+import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+import numpy as np
 
 from mapweave.errors import FileError
 from mapweave.readers.lines import Line, split_lines
@@ -11,7 +14,7 @@ from mapweave.readers.streams import UnusableArchiveError, read_blocks
 from mapweave.scan import Scan
 
 EXPECTED = "expected a CARMEN, TORO or g2o log with FLASER or ROBOTLASER1 lines, plain, gzip or zip"
-_MESSAGE_NAME = re.compile(rb"#|//|[A-Za-z][A-Za-z0-9_]*[:\r]*\Z")
+_MESSAGE_NAME = re.compile(rb"#|//|[A-Za-z][A-Za-z0-9_:]*\Z")
 
 
 def read_scans(
@@ -30,7 +33,8 @@ def read_scans(
         A CARMEN log (``FLASER`` or ``ROBOTLASER1``), or a TORO or g2o graph with ``ROBOTLASER1``;
         plain, gzip or a zip that holds one. Its content tells, not its name.
     odometry
-        Fill `Scan.odometry` with the robot pose that the line states.
+        Fill `Scan.odometry` with the robot pose that the line states, where it is finite. (A log
+        that another program has corrected states the corrected pose there, too.)
     on_warning
         Called once, after the last scan, if damaged lines were left out.
 
@@ -57,10 +61,16 @@ def count_scans(path: str | Path) -> int:
 
 
 def check_is_file(path: Path) -> None:
-    """Raise `FileError` if `path` is missing or a folder."""
-    if not path.exists():
-        raise FileError(path, f"no such file; {EXPECTED}")
-    if path.is_dir():
+    """Raise `FileError` if `path` is missing, a folder, or may not be read."""
+    try:
+        kind = path.stat().st_mode
+        if stat.S_ISREG(kind):  # A pipe can be opened only once.
+            path.open("rb").close()
+    except FileNotFoundError as error:
+        raise FileError(path, f"no such file; {EXPECTED}") from error
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror}); {EXPECTED}") from error
+    if stat.S_ISDIR(kind):
         raise FileError(path, f"is a folder; {EXPECTED}")
 
 
@@ -76,9 +86,13 @@ def read_lines(path: Path) -> Iterator[Line]:
         with path.open("rb") as file:
             yield from split_lines(read_blocks(file))
     except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror})") from error
+        raise FileError(path, f"cannot be read ({error.strerror}); {EXPECTED}") from error
     except UnusableArchiveError as error:
         raise FileError(path, f"{error}; {EXPECTED}") from error
+
+
+class _ForeignLineError(DamagedLineError):
+    """A damaged line that need not have been a scan."""
 
 
 class _Tally:
@@ -89,27 +103,34 @@ class _Tally:
         self.scans = 0
         self.hits = 0
         self.damaged = 0
+        self.foreign = 0
         self.first = ""
 
-    def add_damaged(self, line: Line, why: str) -> None:
+    def add_scan(self, scan: Scan) -> None:
+        self.scans += 1
+        self.hits += int(scan.hits.sum())
+
+    def add_damaged(self, line: Line, error: DamagedLineError) -> None:
         self.damaged += 1
-        self.first = self.first or f"line {line.number}: {why}"
+        self.foreign += isinstance(error, _ForeignLineError)
+        self.first = self.first or f"line {line.number}: {error}"
 
     def report(self, path: Path, on_warning: Callable[[str], None]) -> None:
         """Raise `FileError` if no scan was usable; warn if some were damaged."""
         if not self.hits:
             raise FileError(path, f"{self._why_unusable()}; {EXPECTED}")
         if self.damaged:
-            lines = "line" if self.damaged == 1 else "lines"
-            on_warning(f"{path}: dropped {self.damaged} damaged {lines}, the first {self.first}")
+            on_warning(f"{path}: dropped {self._damage()}")
+
+    def _damage(self) -> str:
+        lines = "line" if self.damaged == 1 else "lines"
+        return f"{self.damaged} damaged {lines}, the first {self.first}"
 
     def _why_unusable(self) -> str:
         if self.scans:
             return f"no usable scan: in none of its {self.scans} scans did a beam come back"
-        if self.damaged:
-            return (
-                f"no usable scan: {self.damaged} of its lines are damaged, the first {self.first}"
-            )
+        if self.damaged > self.foreign:
+            return f"no usable scan: {self._damage()}"
         return "holds no laser scan" if self.lines else "is empty"
 
 
@@ -120,18 +141,18 @@ def _scans(path: Path, odometry: bool, on_warning: Callable[[str], None]) -> Ite
         try:
             record = parse_line(line)
         except DamagedLineError as error:
-            tally.add_damaged(line, str(error))
+            tally.add_damaged(line, error)
             continue
         if record is not None:
             scan = _scan(tally.scans, record, odometry)
-            tally.scans += 1
-            tally.hits += int(scan.hits.sum())
+            tally.add_scan(scan)
             yield scan
     tally.report(path, on_warning)
 
 
 def _scan(index: int, record: LaserRecord, odometry: bool) -> Scan:
-    guess = record.robot_pose if odometry else None
+    usable = odometry and np.isfinite(record.robot_pose).all()
+    guess = record.robot_pose if usable else None
     return Scan(index, record.stamp, record.angles, record.ranges, guess)
 
 
@@ -146,8 +167,15 @@ def parse_line(line: Line) -> LaserRecord | None:
     if line.damage:
         raise DamagedLineError(line.damage)
     words = line.text.split()
-    if words and words[0] in SCAN_KINDS:
+    if not words:
+        return None
+    if words[0] in SCAN_KINDS or _starts_a_kind(words):
         return parse_record(words)
-    if words and not _MESSAGE_NAME.match(words[0]):
-        raise DamagedLineError("does not start with the name of a message")
+    if not _MESSAGE_NAME.match(words[0]):
+        raise _ForeignLineError("does not start with the name of a message")
     return None
+
+
+def _starts_a_kind(words: list[bytes]) -> bool:
+    """Return whether a line was cut off within its first word, which was to be a scan's."""
+    return len(words) == 1 and any(kind.startswith(words[0]) for kind in SCAN_KINDS)

@@ -28,6 +28,7 @@ at just one of these distances is lost with them: a few beams in a million."""
 _ROUNDING = 0.005
 """[m] Readings are written in centimetres: a maximum of 8.191 comes out as 8.19."""
 
+_MAX_DIGITS = 9  # Of a count: Python refuses to read thousands of digits.
 _FLASER_TAIL = 9
 _ROBOTLASER_HEAD = 8
 _ROBOTLASER_TAIL = 14
@@ -116,9 +117,10 @@ def _parse_robotlaser(words: list[bytes]) -> LaserRecord:
 def _count(words: list[bytes], place: int, what: str) -> int:
     if place >= len(words):
         raise DamagedLineError(f"{_name(words)} ends before its number of {what}")
-    if not words[place].isdigit() or len(words[place]) > len(str(len(words))):
+    word = words[place]
+    if not word.isdigit() or len(word) > _MAX_DIGITS:
         raise DamagedLineError(f"{_name(words)} has no usable number of {what}")
-    return int(words[place])
+    return int(word)
 
 
 def _check_length(words: list[bytes], expected: int) -> None:
