@@ -16,6 +16,7 @@ from mapweave_protocol.codec import encode
 from mapweave_protocol.geometry import PackedSubmap
 from mapweave_protocol.map_message import MapMessage, Place
 
+MESSAGES_TO_COMPLETE = 64  # at most, from one complete message to the next: a cache holds as many
 REMEMBERED_BOOTS = 16
 
 
@@ -27,6 +28,7 @@ class MapSender:
         self._sent: dict[int, bytes] = {}
         self._bytes_complete = 0
         self._bytes_since = 0
+        self._messages_since = 0
 
     def payload(self, robot_map: RobotMap, *, complete: bool = False) -> bytes:
         """Return what to publish so that receivers get to `robot_map`.
@@ -46,7 +48,7 @@ class MapSender:
         packed = [self._pack(submap) for submap in robot_map.submaps]
         changed = {p.id for p in packed if self._sent.get(p.id) != p.digest}
         everything = {p.id for p in packed}
-        whole = complete or self._bytes_since >= self._bytes_complete
+        whole = complete or self._due
         payload = encode(MapMessage.of_packed(robot_map, packed, everything if whole else changed))
         self._sent = {p.id: p.digest for p in packed}
         self._count(len(payload), whole=whole)
@@ -61,11 +63,18 @@ class MapSender:
         self._packed[submap.id] = submap, packed
         return packed
 
+    @property
+    def _due(self) -> bool:
+        """Whether everything is to be sent again."""
+        many = self._messages_since >= MESSAGES_TO_COMPLETE - 1
+        return many or self._bytes_since >= self._bytes_complete
+
     def _count(self, size: int, *, whole: bool) -> None:
         if whole:
-            self._bytes_complete, self._bytes_since = size, 0
+            self._bytes_complete, self._bytes_since, self._messages_since = size, 0, 0
         else:
             self._bytes_since += size
+            self._messages_since += 1
 
 
 @dataclass

@@ -29,6 +29,17 @@ class ForeignKeyError(MapweaveError):
         self.expected = expected
 
 
+class EndpointError(MapweaveError):
+    """An endpoint that is not one."""
+
+    def __init__(self, endpoints: tuple[str, ...]) -> None:
+        super().__init__(
+            f"endpoint {', '.join(endpoints)}: expected a protocol, host and port,"
+            " such as tcp/localhost:7447"
+        )
+        self.endpoints = endpoints
+
+
 class UnreachableError(MapweaveError):
     """Nobody answered at the endpoints."""
 

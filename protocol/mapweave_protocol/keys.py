@@ -57,6 +57,10 @@ class KeyFormat:
             raise ForeignKeyError(key, self.text)
         return {name: check_id(name, part) for name, part in match.groupdict().items()}
 
+    def matches(self, key: str) -> bool:
+        """Tell whether `key` is of this format, its parts unchecked."""
+        return self._regex.fullmatch(key) is not None
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The names of the parts, in their order."""
