@@ -16,6 +16,7 @@ from mapweave_protocol.model import (
     Message,
     Number,
     Probability,
+    Sentence,
     Transform,
     WireModel,
     to_transform,
@@ -52,7 +53,7 @@ class WireAlignment(WireModel):
     transform: Transform
     decision: Decision
     confidence: Probability
-    reason: str = Field(max_length=500)
+    reason: Sentence
     evidence: dict[Label, Number] = Field(max_length=MAX_EVIDENCE)
     runner_up: RunnerUp | None
 

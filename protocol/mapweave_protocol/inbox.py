@@ -12,7 +12,7 @@ import zenoh
 from mapweave.errors import MapweaveError
 from mapweave_protocol.codec import decode
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.keys import ALIGNMENT, JOINT_MAP, MAP, STATUS, KeyFormat
+from mapweave_protocol.keys import ALIGNMENT, JOINT_MAP, LIVE, MAP, STATUS, KeyFormat
 from mapweave_protocol.messages import (
     AlignmentMessage,
     JointMapMessage,
@@ -104,6 +104,27 @@ class Reader(Generic[M]):
         if key not in self._warned and len(self._warned) < MAX_WARNED:
             self._warned.add(key)
             _log.warning("%s: ignored, %s", key, error)
+
+
+@dataclass(frozen=True, slots=True)
+class Presence:
+    """That a run of a robot is here, or no longer."""
+
+    robot: str
+    boot: str
+    here: bool
+
+
+def read_presence(arrival: Arrival) -> Presence | None:
+    """Return what a liveliness token says, None if `arrival` is none of a robot's."""
+    if not LIVE.matches(arrival.key):
+        return None
+    try:
+        parts = LIVE.parse(arrival.key)
+    except MapweaveError as error:
+        _log.warning("%s: ignored, %s", arrival.key, error)
+        return None
+    return Presence(parts["robot"], parts["boot"], here=not arrival.gone)
 
 
 def check_origin(message: Message, parts: Mapping[str, str]) -> None:

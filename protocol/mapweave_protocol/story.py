@@ -1,0 +1,95 @@
+"""What happens in a team, told in plain lines; no network and no clock in here."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mapweave.maps import JointMap, RobotMap
+from mapweave_protocol.messages import AlignmentMessage, StatusMessage
+
+
+@dataclass
+class RobotState:
+    """What is known of a robot.
+
+    Attributes
+    ----------
+    boot
+        Of the run that is alive, None if none is.
+    """
+
+    boot: str | None = None
+    status: StatusMessage | None = None
+    submaps: int = 0
+    segments: int = 0
+
+    @property
+    def progress(self) -> str:
+        """How far it is, in a few words."""
+        if self.status is None:
+            return ""
+        total = f"/{self.status.scans_total}" if self.status.scans_total else ""
+        return f"{self.status.scans_seen}{total} scans, {self.status.scans_placed} placed"
+
+
+class Story:
+    """Takes in what happens, and returns the lines that tell what is new about it."""
+
+    def __init__(self) -> None:
+        self.robots: dict[str, RobotState] = {}
+        self.joint: JointMap | None = None
+        self._decisions: dict[tuple[str, str], str] = {}
+
+    def appeared(self, robot: str, boot: str) -> Iterator[str]:
+        """Tell that a run of a robot began."""
+        state = self._robot(robot)
+        if state.boot != boot:
+            state.boot = boot
+            yield f"{robot} is here"
+
+    def left(self, robot: str, boot: str) -> Iterator[str]:
+        """Tell that a run of a robot ended."""
+        state = self._robot(robot)
+        if state.boot == boot:
+            state.boot = None
+            yield f"{robot} is gone"
+
+    def status(self, message: StatusMessage) -> Iterator[str]:
+        """Tell when a robot has finished mapping."""
+        state = self._robot(message.robot)
+        before, state.status = state.status, message
+        finished_before = before is not None and before.state == "finished"
+        if message.state == "finished" and not finished_before:
+            yield f"{message.robot} has finished: {state.progress}"
+
+    def mapped(self, robot_map: RobotMap) -> Iterator[str]:
+        """Tell when a robot's map has got another submap."""
+        state = self._robot(robot_map.robot)
+        before, state.submaps = state.submaps, len(robot_map.submaps)
+        state.segments = sum(len(submap.map.segments) for submap in robot_map.submaps)
+        if state.submaps != before:
+            parts = len(robot_map.components)
+            pieces = f" in {parts} components" if parts > 1 else ""
+            yield f"{robot_map.robot}: {state.submaps} submaps{pieces}, {state.segments} segments"
+
+    def aligned(self, message: AlignmentMessage) -> Iterator[str]:
+        """Tell each decision that is new."""
+        for alignment in message.alignments:
+            pair = alignment.reference, alignment.other
+            if self._decisions.get(pair) != alignment.decision:
+                self._decisions[pair] = alignment.decision
+                yield (
+                    f"{pair[0]} and {pair[1]}: {alignment.decision},"
+                    f" confidence {alignment.confidence:.2f} ({alignment.reason})"
+                )
+
+    def joined(self, joint: JointMap) -> Iterator[str]:
+        """Tell a version of the joint map."""
+        self.joint = joint
+        groups = [
+            f"{' + '.join(sorted(component.robots))} ({component.confidence:.2f})"
+            for component in joint.components
+        ]
+        yield f"joint map {joint.version}: {', '.join(groups) or 'nothing yet'}"
+
+    def _robot(self, robot: str) -> RobotState:
+        return self.robots.setdefault(robot, RobotState())
