@@ -42,8 +42,13 @@ def _overview(points: Sequence[str]) -> str:
     commands = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
     lines = [f"  {name:<8} {commands[name].load().summary}" for name in points]
     return "usage: mapweave COMMAND …\n\n" + "\n".join(
-        ["Joint line maps of robot teams from raw 2D laser scans.", "", *lines, "",
-         "mapweave COMMAND --help tells more; mapweave --version."]
+        [
+            "Joint line maps of robot teams from raw 2D laser scans.",
+            "",
+            *lines,
+            "",
+            "mapweave COMMAND --help tells more; mapweave --version.",
+        ]
     )
 
 

@@ -1,0 +1,120 @@
+"""A submap while it grows: G_t from G_(t-1) and S_t (paper, V and VI)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from shapely.geometry.base import BaseGeometry
+
+from mapweave import se2
+from mapweave.arrays import FloatArray, IntArray
+from mapweave.free_space import FreeSpaceParameters, rings, scan_free_space, unite
+from mapweave.maps import LineMap, Trajectory
+from mapweave.merging import MergingParameters, count_support, merge_scan
+from mapweave.polylines import group_polylines
+from mapweave.scan import Scan
+
+
+class SubmapParameters(BaseModel):
+    """What goes into a submap and when it is finished."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    length: float = Field(
+        12.0, gt=0, description="[m] of path that finish a submap; drift inside is negligible"
+    )
+    max_turn: float = Field(25.0, gt=0, description="[rad] of turning that finish one")
+    max_scans: int = Field(400, ge=1, description="placed scans that finish one")
+    max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
+    free_space_step: float = Field(0.2, gt=0, description="[m] of motion between free-space scans")
+    free_space_turn: float = Field(0.26, gt=0, description="[rad] of rotation between them: 15°")
+    merging: MergingParameters = MergingParameters()
+    free_space: FreeSpaceParameters = FreeSpaceParameters()
+
+
+@dataclass(slots=True)
+class _Sightings:
+    """Which scan saw what became which segment."""
+
+    labels: IntArray
+    scans: IntArray
+
+
+class GrowingSubmap:
+    """Takes placed scans and merges them into lines; its frame is that of its first scan."""
+
+    def __init__(self, parameters: SubmapParameters) -> None:
+        self._parameters = parameters
+        self._segments: FloatArray = np.empty((0, 4))
+        self._weights: FloatArray = np.empty(0)
+        self._sightings = _Sightings(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+        self._cleared: list[BaseGeometry] = []
+        self._cleared_from: FloatArray | None = None
+        self._indices: list[int] = []
+        self._stamps: list[float] = []
+        self._poses: list[FloatArray] = []
+        self._path = 0.0
+        self._turned = 0.0
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no scan was added yet."""
+        return not self._poses
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the next scan belongs into another submap."""
+        p = self._parameters
+        return (
+            self._path >= p.length or self._turned >= p.max_turn or len(self._poses) >= p.max_scans
+        )
+
+    def add(self, scan: Scan, segments: FloatArray, pose: FloatArray) -> None:
+        """Merge `scan` with its (k, 4) `segments` [m], sensor frame, taken at `pose` (3,)."""
+        if self._poses:
+            step = se2.between(self._poses[-1], pose)
+            self._path += float(np.hypot(step[0], step[1]))
+            self._turned += abs(float(step[2]))
+        self._indices.append(scan.index)
+        self._stamps.append(scan.stamp)
+        self._poses.append(pose)
+        self._merge(scan.index, se2.transform_segments(pose, segments))
+        self._clear(scan, pose)
+
+    def trajectory(self) -> Trajectory:
+        """Return the poses of the scans added, in order of their index."""
+        order = np.argsort(self._indices)
+        return Trajectory(
+            np.array(self._indices, dtype=np.int64)[order],
+            np.array(self._stamps)[order],
+            np.array(self._poses).reshape(-1, 3)[order],
+        )
+
+    def line_map(self) -> LineMap:
+        """Return the lines and the free space seen so far."""
+        order, polyline = group_polylines(self._segments, self._parameters.max_gap)
+        support = count_support(self._sightings.labels, self._sightings.scans)
+        if self._cleared:
+            self._cleared = [unite(self._cleared, self._parameters.free_space)]
+        outlines = rings(self._cleared[0]) if self._cleared else ()
+        return LineMap(self._segments[order], polyline, support[order], outlines)
+
+    def _merge(self, scan: int, segments: FloatArray) -> None:
+        evolution = merge_scan(self._segments, self._weights, segments, self._parameters.merging)
+        known = evolution.labels[: len(self._segments)]
+        fresh = evolution.labels[len(self._segments) :]
+        self._sightings = _Sightings(
+            np.concatenate([known[self._sightings.labels], fresh]),
+            np.concatenate([self._sightings.scans, np.full(len(fresh), scan)]),
+        )
+        self._segments, self._weights = evolution.segments, evolution.weights
+
+    def _clear(self, scan: Scan, pose: FloatArray) -> None:
+        """Note what `scan` saw through, unless a scan from about here did already."""
+        p = self._parameters
+        if self._cleared_from is not None:
+            x, y, turn = se2.between(self._cleared_from, pose)
+            if np.hypot(x, y) < p.free_space_step and abs(turn) < p.free_space_turn:
+                return
+        self._cleared.append(scan_free_space(scan, pose, p.free_space))
+        self._cleared_from = pose

@@ -1,0 +1,99 @@
+"""Oriented points: samples of seen surfaces with the normals towards the side they were seen from.
+
+What the alignment works on. A scan and a map are compared by their oriented points, so that a
+wall seen from one side never pulls at the same wall's other side.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapweave import se2
+from mapweave.arrays import FloatArray, IntArray
+from mapweave.scan import Scan
+from mapweave.segments import ScanSegments
+
+MAX_NEIGHBOUR_GAP = 0.5  # [m] two returns farther apart do not tell a surface's direction
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Oriented points in one frame.
+
+    Attributes
+    ----------
+    points
+        (n, 2) [m].
+    normals
+        (n, 2) unit vectors towards the visible side.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.points)
+
+    def moved(self, pose: FloatArray) -> "Surface":
+        """Return the same surface, given in the frame at `pose` (3,), in that frame's parent."""
+        return Surface(
+            se2.transform_points(pose, self.points), self.normals @ se2.rotation(pose[2]).T
+        )
+
+    def at(self, index: IntArray | slice) -> "Surface":
+        """Return the points selected by `index`."""
+        return Surface(self.points[index], self.normals[index])
+
+
+def join_surfaces(surfaces: list[Surface]) -> Surface:
+    """Return all points of `surfaces`, which share a frame."""
+    return Surface(
+        np.concatenate([s.points for s in surfaces]), np.concatenate([s.normals for s in surfaces])
+    )
+
+
+def left_normals(directions: FloatArray) -> FloatArray:
+    """Return (n, 2) unit normals on the left, the visible side, of (n, 2) `directions`."""
+    lengths = np.maximum(np.hypot(directions[:, 0], directions[:, 1]), 1e-12)
+    return np.column_stack([-directions[:, 1], directions[:, 0]]) / lengths[:, None]
+
+
+def scan_surface(scan: Scan, segments: ScanSegments, max_range: float) -> Surface:
+    """Return the oriented points of `scan` up to `max_range` [m], sensor frame.
+
+    A return on a segment takes the segment's normal; another, its neighbours'. Returns without
+    a neighbour near enough have no direction and are left out.
+    """
+    with np.errstate(invalid="ignore"):
+        used = np.flatnonzero(scan.hits & (scan.ranges <= max_range))
+    points = scan.points[used]
+    if len(used) < 2:  # noqa: PLR2004
+        return Surface(np.empty((0, 2)), np.empty((0, 2)))
+    directions = _neighbour_directions(points)
+    label = segments.label[used]
+    on_segment = label >= 0
+    lines = segments.segments[label[on_segment]]
+    directions[on_segment] = lines[:, 2:] - lines[:, :2]
+    oriented = np.hypot(*directions.T) > 0
+    return Surface(points[oriented], left_normals(directions[oriented]))
+
+
+def segment_surface(segments: FloatArray, spacing: float) -> Surface:
+    """Return oriented points every `spacing` [m] along (n, 4) directed `segments`."""
+    directions = segments[:, 2:] - segments[:, :2]
+    lengths = np.hypot(directions[:, 0], directions[:, 1])
+    counts = np.maximum(1, np.round(lengths / spacing)).astype(np.int64)
+    owner = np.repeat(np.arange(len(segments)), counts)
+    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    fraction = (rank + 0.5) / counts[owner]
+    return Surface(
+        segments[owner, :2] + fraction[:, None] * directions[owner], left_normals(directions)[owner]
+    )
+
+
+def _neighbour_directions(points: FloatArray) -> FloatArray:
+    """(n, 2) from the previous to the next return; zero where both are too far away."""
+    forward = np.vstack([np.diff(points, axis=0), np.zeros((1, 2))])
+    forward[np.hypot(*forward.T) > MAX_NEIGHBOUR_GAP] = 0
+    return forward + np.vstack([np.zeros((1, 2)), forward[:-1]])

@@ -1,0 +1,45 @@
+"""What a scan saw through: every beam proves the space before its return to be free."""
+
+import numpy as np
+
+from mapweave.arrays import BoolArray, FloatArray
+from mapweave.scan import Scan
+
+
+def clear_ranges(scan: Scan, max_range: float) -> FloatArray:
+    """Return (beams,) how far [m] each beam and both its neighbours saw nothing.
+
+    The neighbours count because space between two beams is only known to be free as far as both
+    reach. A beam that did not come back proves nothing (glass, black cloth): 0.
+    """
+    reach = np.minimum(np.nan_to_num(scan.ranges, nan=0.0), max_range)
+    padded = np.concatenate([reach[:1], reach, reach[-1:]])
+    return np.minimum(np.minimum(padded[:-2], padded[1:-1]), padded[2:])
+
+
+def seen_through(
+    scan: Scan, points: FloatArray, margin: FloatArray | float, max_range: float
+) -> BoolArray:
+    """Tell which (n, 2) `points` [m], sensor frame, lie where `scan` saw free space.
+
+    Parameters
+    ----------
+    margin
+        [m] how much nearer than what the beam hit a point must be: scalar or (n,).
+    max_range
+        [m] beyond which a beam proves nothing.
+    """
+    clear = clear_ranges(scan, max_range)
+    bearing = np.arctan2(points[:, 1], points[:, 0])
+    beam = nearest_beam(scan, bearing)
+    inside = (bearing >= scan.angles[0]) & (bearing <= scan.angles[-1])
+    return inside & (np.hypot(points[:, 0], points[:, 1]) < clear[beam] - margin)
+
+
+def nearest_beam(
+    scan: Scan, bearing: FloatArray
+) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    """Return (n,) which beam points nearest to each `bearing` [rad]."""
+    spacing = (scan.angles[-1] - scan.angles[0]) / max(len(scan.angles) - 1, 1)
+    beam = np.rint((bearing - scan.angles[0]) / spacing).astype(np.int64)
+    return np.clip(beam, 0, len(scan.angles) - 1)
