@@ -162,7 +162,9 @@ def _first_problem(error: ValidationError) -> str:
     if isinstance(found, str | float | int) and problem["loc"]:
         message += f", found {reprlib.repr(found)}"
     place = "".join(_step(step) for step in problem["loc"]).removeprefix(".")
-    return f"{place}: {message}" if place else f"{message}; {_EXPECTED}"
+    if not place or problem["type"] == "missing":
+        message += f"; {_EXPECTED}"
+    return f"{place}: {message}" if place else message
 
 
 def _step(step: int | str) -> str:
