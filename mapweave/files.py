@@ -123,12 +123,13 @@ def replace_file(path: str | Path) -> Iterator[Path]:
     try:
         _check_replaceable(given)
         temporary.open("xb").close()
-        yield temporary
-        temporary.replace(target)
+        try:
+            yield temporary
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
     except OSError as error:
-        raise FileError(given, f"cannot be written ({error.strerror})") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+        raise FileError(given, f"cannot be written ({error.strerror or error})") from error
 
 
 def _check_replaceable(path: Path) -> None:
