@@ -1,0 +1,152 @@
+"""``mapweave team``: a whole team on this machine, from scans to the joint map."""
+
+import argparse
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.text import Text
+
+from mapweave.cli import Command
+from mapweave.errors import FileError
+from mapweave.files import write_joint
+from mapweave.names import check_id
+from mapweave.picture import draw_joint
+from mapweave_deploy.crew import Crew
+from mapweave_deploy.display import make_display
+from mapweave_deploy.launcher import Outcome, Plan, free_endpoint, run_team, start_server
+from mapweave_deploy.options import check_source, configure
+from mapweave_deploy.report import tell_files, tell_outcome
+from mapweave_deploy.roster import Member, simulated_team, team_from_logs
+
+
+@dataclass(frozen=True, slots=True)
+class Folder:
+    """What is where in the output folder."""
+
+    path: Path
+
+    @property
+    def joint(self) -> Path:
+        """The joint map."""
+        return self.path / "joint.json"
+
+    @property
+    def picture(self) -> Path:
+        """Its picture."""
+        return self.path / "joint.png"
+
+    @property
+    def store(self) -> Path:
+        """The coordinator's store."""
+        return self.path / "store.sqlite"
+
+    @property
+    def logs(self) -> Path:
+        """What each process wrote."""
+        return self.path / "processes"
+
+    @property
+    def scans(self) -> Path:
+        """Simulated scans and truth."""
+        return self.path / "scans"
+
+    def create(self) -> None:
+        """Make the folders.
+
+        Raises
+        ------
+        FileError
+            If that cannot be done.
+        """
+        try:
+            self.logs.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(self.path, f"cannot be made a folder ({error.strerror})") from error
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the team; write and tell what it came to."""
+    check_source(options)
+    check_id("team", options.team)
+    console = Console()
+    folder = Folder(options.output)
+    folder.create()
+    _say(console, [_source(options)])
+    plan = _plan(options, folder)
+    with Crew(folder.logs) as crew:
+        _say(console, [_how_to_watch(plan)])
+        with make_display(console, plan.members) as display:
+            outcome = run_team(crew, plan, display)
+        store = _keep_store(plan.store, options.store or folder.store)
+        _write(outcome, folder)
+        _say(console, tell_outcome(outcome, plan.members, simulated=options.world is not None))
+        files = [("picture", folder.picture), ("joint map", folder.joint), ("store", store)]
+        _say(console, tell_files([*files, ("what each process said", folder.logs)]))
+        if options.stay:
+            _stay(crew, plan, store, console)
+    return 0
+
+
+def _plan(options: argparse.Namespace, folder: Folder) -> Plan:
+    return Plan(
+        team=options.team,
+        members=_members(options, folder),
+        rate=options.rate,
+        listen=options.listen or free_endpoint(),
+        store=options.store or _new_store(folder.store),
+        timeout=options.timeout,
+    )
+
+
+def _members(options: argparse.Namespace, folder: Folder) -> list[Member]:
+    if options.world is not None:
+        return simulated_team(options.world, options.robots, options.seed, folder.scans)
+    return team_from_logs(options.logs, options.robots)
+
+
+def _new_store(final: Path) -> Path:
+    """Return where the store is written until it is whole: an older one survives a failure."""
+    new = final.with_name(f"{final.stem}-new{final.suffix}")
+    for leftover in (new, *(new.with_name(new.name + end) for end in ("-wal", "-shm"))):
+        leftover.unlink(missing_ok=True)
+    return new
+
+
+def _keep_store(written: Path, final: Path) -> Path:
+    written.replace(final)
+    return final
+
+
+def _write(outcome: Outcome, folder: Folder) -> None:
+    write_joint(folder.joint, outcome.joint)
+    draw_joint(outcome.joint, folder.picture, outcome.maps)
+
+
+def _source(options: argparse.Namespace) -> str:
+    if options.world is not None:
+        return f"{options.robots} robots drive through the {options.world}, seed {options.seed}"
+    return f"{options.robots} robots for each of: {', '.join(str(log) for log in options.logs)}"
+
+
+def _how_to_watch(plan: Plan) -> str:
+    return f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}"
+
+
+def _stay(crew: Crew, plan: Plan, store: Path, console: Console) -> None:
+    """Serve what was stored until Ctrl-C, which is the way to end this."""
+    start_server(crew, plan, store)
+    _say(console, ["Router and coordinator stay; Ctrl-C ends them."])
+    while True:
+        crew.check()
+        time.sleep(1.0)
+
+
+def _say(console: Console, lines: Iterable[str]) -> None:
+    for line in lines:
+        console.print(Text(line), soft_wrap=True)
+
+
+command = Command("run a whole team on this machine", configure, run)

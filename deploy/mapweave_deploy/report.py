@@ -1,0 +1,113 @@
+"""What a team came to, in words."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mapweave.maps import Alignment, JointComponent
+from mapweave_deploy.launcher import Outcome
+from mapweave_deploy.occupancy import grid_bytes
+from mapweave_deploy.roster import Member
+from mapweave_deploy.verdict import Limits, Verdict, judge
+
+WORLD_LIMITS = Limits(0.3, np.radians(3.0))
+LOG_LIMITS = Limits(0.5, np.radians(5.0))  # poses in logs come from other programs
+
+
+def tell_outcome(outcome: Outcome, members: Sequence[Member], *, simulated: bool) -> Iterator[str]:
+    """Yield what happened: who joined whom, what was refused, what is right, what was sent."""
+    yield ""
+    yield from _tell_robots(outcome, members)
+    yield from _tell_alignments(outcome.joint.alignments)
+    yield f"Joint map, version {outcome.joint.version}:"
+    for component in outcome.joint.components:
+        yield f"  {_tell_component(component)}"
+    limits = WORLD_LIMITS if simulated else LOG_LIMITS
+    verdicts = list(judge(outcome.joint, outcome.maps, members, limits))
+    yield from _tell_verdicts(verdicts, limits, "simulated truth" if simulated else "log's poses")
+    if not simulated and verdicts:
+        yield "  (which are worth as much as the program that wrote them)"
+    yield from _tell_traffic(outcome, members)
+
+
+def tell_files(files: Sequence[tuple[str, Path]]) -> Iterator[str]:
+    """Yield the files that were written."""
+    width = max(len(kind) for kind, _ in files) + 1
+    yield "Written:"
+    for kind, path in files:
+        yield f"  {kind + ':':{width}} {path}"
+
+
+def _tell_robots(outcome: Outcome, members: Sequence[Member]) -> Iterator[str]:
+    yield "Robots:"
+    for member in members:
+        status = outcome.recorder.statuses[member.robot]
+        parts = f", {status.components} components" if status.components > 1 else ""
+        yield (
+            f"  {member.robot}: {status.scans_placed} of {status.scans_seen} scans placed,"
+            f" {status.submaps} submaps{parts}"
+        )
+
+
+def _tell_alignments(alignments: Sequence[Alignment]) -> Iterator[str]:
+    yield "Who joined whom:"
+    joined = [a for a in alignments if a.decision == "accepted"]
+    for alignment in joined:
+        yield f"  {_names(alignment)}, confidence {alignment.confidence:.2f}: {alignment.reason}"
+    if not joined:
+        yield "  nobody"
+    others = [a for a in alignments if a.decision != "accepted"]
+    if others:
+        yield "What was not joined:"
+    for alignment in others:
+        yield f"  {_names(alignment)}, {alignment.decision}: {alignment.reason}"
+
+
+def _names(alignment: Alignment) -> str:
+    return f"{alignment.reference} and {alignment.other}"
+
+
+def _tell_component(component: JointComponent) -> str:
+    names = " + ".join(sorted(component.robots))
+    segments = f"{len(component.map.segments)} segments"
+    if len(component.robots) == 1:
+        return f"{names} alone, {segments}"
+    return f"{names}, confidence {component.confidence:.2f}, {segments}"
+
+
+def _tell_verdicts(verdicts: Sequence[Verdict], limits: Limits, truth: str) -> Iterator[str]:
+    if not verdicts:
+        return
+    right = sum(verdict.right for verdict in verdicts)
+    bounds = f"{limits.distance:g} m and {np.degrees(limits.angle):g}°"
+    yield f"Right within {bounds} of the {truth}: {right} of {len(verdicts)} joined pairs"
+    for verdict in verdicts:
+        yield f"  {verdict.reference} and {verdict.other}: {_tell_error(verdict)}"
+
+
+def _tell_error(verdict: Verdict) -> str:
+    if np.isinf(verdict.distance):
+        return "WRONG: they are in different places"
+    error = f"off by {verdict.distance:.2f} m and {np.degrees(verdict.angle):.1f}°"
+    return f"right, {error}" if verdict.right else f"WRONG, {error}"
+
+
+def _tell_traffic(outcome: Outcome, members: Sequence[Member]) -> Iterator[str]:
+    yield "What each robot sent:"
+    for member in members:
+        counts = outcome.recorder.sent(member.robot)
+        total = sum(count.size for count in counts.values())
+        kinds = ", ".join(f"{kind} {_size(count.size)}" for kind, count in counts.items())
+        yield f"  {member.robot}: {_size(total)} ({kinds}){_tell_grid(outcome, member)}"
+
+
+def _tell_grid(outcome: Outcome, member: Member) -> str:
+    if member.robot not in outcome.maps:
+        return ""
+    plain, deflated = grid_bytes(member, outcome.maps[member.robot])
+    return f"; once as an occupancy grid of 5 cm: {_size(plain)}, deflated {_size(deflated)}"
+
+
+def _size(count: int) -> str:
+    return f"{count / 1000:.1f} kB"

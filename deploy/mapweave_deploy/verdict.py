@@ -1,0 +1,139 @@
+"""Whether robots were joined rightly: their places to each other against the truth."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from mapweave import se2
+from mapweave.arrays import FloatArray, IntArray
+from mapweave.maps import JointMap, RobotMap, component_name
+from mapweave_deploy.roster import Member
+
+LEVER = 1.0  # [m], how much a heading weighs against a position in a fit
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How far from the truth is right still.
+
+    Attributes
+    ----------
+    distance
+        [m]
+    angle
+        [rad]
+    """
+
+    distance: float
+    angle: float
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """How two components that were joined lie to each other, against the truth.
+
+    Attributes
+    ----------
+    reference, other
+        Component names.
+    distance
+        By how much points on the path of `other` are displaced, at the median [m]; infinite where
+        the two cannot be joined because they are in different places.
+    angle
+        By how much it is turned [rad].
+    right
+        Whether that is within the limits.
+    """
+
+    reference: str
+    other: str
+    distance: float
+    angle: float
+    right: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A component with its place in the joint map and in truth.
+
+    Attributes
+    ----------
+    name
+        Such as ``r1/0``.
+    place
+        Where the truth is given: in one log, or one world.
+    joint, true
+        (3,) poses of the component's frame [m, m, rad].
+    path
+        (m, 2) of its scans, in its frame [m].
+    """
+
+    name: str
+    place: str
+    joint: FloatArray
+    true: FloatArray
+    path: FloatArray
+
+
+def judge(
+    joint: JointMap, maps: Mapping[str, RobotMap], members: Sequence[Member], limits: Limits
+) -> Iterator[Verdict]:
+    """Yield a verdict on every pair of components that `joint` holds together."""
+    placed = {
+        part.name: part
+        for member in members
+        if member.robot in maps
+        for part in _placed(joint, maps[member.robot], member)
+    }
+    for component in joint.components:
+        for reference, other in combinations(sorted(component.robots), 2):
+            if reference in placed and other in placed:
+                yield _compare(placed[reference], placed[other], limits)
+
+
+def _placed(joint: JointMap, robot_map: RobotMap, member: Member) -> Iterator[Placed]:
+    """Yield the components of a robot of which enough is known to judge them."""
+    poses = {name: pose for part in joint.components for name, pose in part.robots.items()}
+    for component in robot_map.components:
+        name = component_name(robot_map.robot, component)
+        index, path = component_path(robot_map, component)
+        _, here, there = np.intersect1d(index, member.truth_index, return_indices=True)
+        if name in poses and len(here):
+            true = fit(path[here], member.truth_pose[there])
+            yield Placed(name, member.place, poses[name], true, path[:, :2])
+
+
+def component_path(robot_map: RobotMap, component: int) -> tuple[IntArray, FloatArray]:
+    """Return the (m,) scan indices and (m, 3) poses of a component's scans, in its frame."""
+    submaps = [submap for submap in robot_map.submaps if submap.component == component]
+    index = [submap.trajectory.scan_index for submap in submaps]
+    poses = [se2.compose(submap.pose, submap.trajectory.pose) for submap in submaps]
+    return np.concatenate(index), np.concatenate(poses)
+
+
+def fit(poses: FloatArray, truth: FloatArray) -> FloatArray:
+    """Return the motion (3,) that takes `poses` (m, 3) closest to `truth` (m, 3).
+
+    Least squares over positions and, with the lever, headings: a path on one spot has only those.
+    In the plane the best rotation is the direction of a sum of complex numbers.
+    """
+    p, q = poses[:, 0] + 1j * poses[:, 1], truth[:, 0] + 1j * truth[:, 1]
+    turned = np.sum(np.conj(p - np.mean(p)) * (q - np.mean(q)))
+    turned += LEVER**2 * np.sum(np.exp(1j * (truth[:, 2] - poses[:, 2])))
+    theta = np.angle(turned)
+    shift = np.mean(q) - np.exp(1j * theta) * np.mean(p)
+    return np.array([shift.real, shift.imag, theta])
+
+
+def _compare(reference: Placed, other: Placed, limits: Limits) -> Verdict:
+    if reference.place != other.place:
+        return Verdict(reference.name, other.name, np.inf, np.pi, right=False)
+    found = se2.between(reference.joint, other.joint)
+    true = se2.between(reference.true, other.true)
+    apart = se2.transform_points(found, other.path) - se2.transform_points(true, other.path)
+    distance = float(np.median(np.linalg.norm(apart, axis=1)))
+    angle = float(np.abs(se2.wrap(found[2] - true[2])))
+    right = distance <= limits.distance and angle <= limits.angle
+    return Verdict(reference.name, other.name, distance, angle, right)
