@@ -128,6 +128,11 @@ def _run_live(console: Console, watcher: Watcher, story: Iterator[str | None]) -
             live.update(_show(watcher.story, lines), refresh=True)
 
 
+def _run_plain(console: Console, story: Iterator[str | None]) -> None:
+    for line in filter(None, story):
+        console.print(Text(line), soft_wrap=True)
+
+
 def _configure(parser: argparse.ArgumentParser) -> None:
     add_connection_arguments(parser)
 
@@ -145,8 +150,8 @@ def _run(options: argparse.Namespace) -> int:
     )
     if console.is_terminal:
         _run_live(console, watcher, story)
-    for line in filter(None, story):
-        console.print(Text(line), soft_wrap=True)
+    else:
+        _run_plain(console, story)
     return 0
 
 

@@ -1,0 +1,210 @@
+"""A robot: its scans become its map, its map and its peers' maps become alignments."""
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import zenoh
+from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.inbox import Inbox
+from mapweave_protocol.keys import ALIGNMENT, LIVE, MAP, STATUS
+from mapweave_protocol.messages import AlignmentMessage, MapVersion, StatusMessage
+from mapweave_protocol.session import declare_subscriber
+
+from mapweave.mapper import Mapper
+from mapweave.maps import RobotMap
+from mapweave.scan import Scan
+from mapweave_agent.comparer import Comparer, Outcome
+from mapweave_agent.comparing import ComparisonPlan
+from mapweave_agent.outbox import Outbox
+from mapweave_agent.planning import AgentParameters, PublicationPlan
+from mapweave_agent.reception import Reception
+from mapweave_agent.source import Pace
+
+POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
+MAX_ARRIVALS = 64  # taken in at once, so that a flood does not hold up mapping
+
+_log = logging.getLogger(__name__)
+Stopping = Callable[[], bool]
+
+
+class Agent:
+    """One run of a robot.
+
+    Parameters
+    ----------
+    session
+        An open session; it stays the caller's.
+    team
+        The team's id.
+    mapper
+        Maps the scans of this run.
+    comparer
+        Compares maps; it stays the caller's.
+    total
+        How many scans there will be, where known.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        team: str,
+        mapper: Mapper,
+        comparer: Comparer,
+        total: int | None,
+        parameters: AgentParameters,
+    ) -> None:
+        self._session = session
+        self._team = team
+        self._mapper = mapper
+        self._comparer = comparer
+        self._total = total
+        self._parameters = parameters
+        self._publication = PublicationPlan(parameters.map_interval)
+        self._comparisons = ComparisonPlan(mapper.robot, parameters)
+        self._reception = Reception(mapper.robot, mapper.boot, self._comparisons)
+        self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
+        self._inbox = Inbox()
+        self._published: RobotMap = mapper.robot_map()
+        self._scans_seen = 0
+        self._changed = False
+        self._finished = False
+        self._status_due = 0.0
+
+    def run(self, scans: Iterator[Scan], pace: Pace, stopping: Stopping) -> None:
+        """Map all `scans`, then compare with the peers until `stopping`.
+
+        Raises
+        ------
+        FileError
+            If the scans cannot be read any further.
+        """
+        with self._outbox, self._listening():
+            _log.info("%s joins team %s", self._mapper.robot, self._team)
+            self._map_all(scans, pace, stopping)
+            if not stopping():
+                self._finish()
+            while not stopping():
+                self._attend(POLL)
+            if self._reception.refused:
+                _log.warning("%d messages were not valid and ignored", self._reception.refused)
+
+    def _map_all(self, scans: Iterator[Scan], pace: Pace, stopping: Stopping) -> None:
+        started = time.monotonic()
+        for scan in scans:
+            due = started + pace.due(scan)
+            self._attend(0.0)
+            while not stopping() and (left := due - time.monotonic()) > 0:
+                self._attend(min(left, POLL))
+            if stopping():
+                return
+            self._map(scan)
+
+    def _map(self, scan: Scan) -> None:
+        placement = self._mapper.add(scan)
+        self._scans_seen += 1
+        self._changed |= placement.placed
+        if placement.submap_finished or placement.lost:
+            self._publication.hurry()
+        if placement.lost:
+            _log.warning("scan %d fits nowhere: a new component begins", scan.index)
+
+    def _finish(self) -> None:
+        """Publish the last map, whole, and say that it is the last."""
+        self._finished = True
+        self._publish_map(complete=True)
+        self._publish_status()
+        _log.info(
+            "mapped %d of %d scans into %d submaps",
+            _scans_placed(self._published),
+            self._scans_seen,
+            len(self._published.submaps),
+        )
+
+    def _attend(self, wait: float) -> None:
+        """Wait for what arrives, then do everything that is due."""
+        timeout = wait
+        for _ in range(MAX_ARRIVALS):
+            arrival = self._inbox.get(timeout)
+            if arrival is None:
+                break
+            self._reception.take(arrival)
+            timeout = 0.0
+        now = time.monotonic()
+        if self._changed and not self._finished and self._publication.due(now):
+            self._publish_map(complete=False)
+        self._compare(now)
+        if now >= self._status_due:
+            self._publish_status()
+
+    def _compare(self, now: float) -> None:
+        """Publish the outcome of the comparison under way, if there is one; begin the next."""
+        outcome = self._comparer.take()
+        if outcome is not None:
+            self._publish_outcome(outcome)
+            self._comparisons.done(outcome.comparison, now, outcome.took)
+            self._publish_status()
+        if not self._comparer.busy:
+            comparison = self._comparisons.begin(now)
+            if comparison is not None:
+                self._comparer.start(comparison)
+
+    def _publish_outcome(self, outcome: Outcome) -> None:
+        comparison = outcome.comparison
+        if outcome.alignments is None:
+            # What was found out about earlier versions of the pair stands.
+            _log.error("comparing with %s failed: %s", comparison.peer, outcome.failure)
+            return
+        message = AlignmentMessage.pack(
+            self._mapper.robot,
+            MapVersion.of(comparison.reference),
+            MapVersion.of(comparison.other),
+            outcome.alignments,
+        )
+        self._outbox.send_alignments(message)
+
+    def _publish_map(self, *, complete: bool) -> None:
+        self._published = self._mapper.robot_map()
+        self._outbox.send_map(self._published, complete=complete)
+        self._comparisons.own_map(self._published, finished=self._finished)
+        self._publication.published(time.monotonic())
+        self._changed = False
+
+    def _publish_status(self) -> None:
+        status = StatusMessage(
+            robot=self._mapper.robot,
+            boot=self._mapper.boot,
+            stamp=time.time(),
+            state="finished" if self._finished else "mapping",
+            scans_seen=self._scans_seen,
+            scans_placed=_scans_placed(self._published),
+            scans_total=self._total,
+            components=len(self._published.components),
+            submaps=len(self._published.submaps),
+            map_version=self._published.version,
+            compared=dict(self._comparisons.published),
+            sent=dict(self._outbox.sent),
+        )
+        self._outbox.send_status(status)
+        self._status_due = time.monotonic() + self._parameters.status_interval
+
+    @contextmanager
+    def _listening(self) -> Iterator[None]:
+        """Subscribe to the peers' presence, then to what they say."""
+        robot, put = self._mapper.robot, self._inbox.put
+        live, maps = LIVE.pattern(team=self._team), MAP.pattern(team=self._team)
+        as_reference = ALIGNMENT.pattern(team=self._team, reference=robot)
+        as_other = ALIGNMENT.pattern(team=self._team, other=robot)
+        with (
+            self._session.liveliness().declare_subscriber(live, put, history=True),
+            declare_subscriber(self._session, as_reference, put),
+            declare_subscriber(self._session, as_other, put),
+            declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
+            self._session.declare_subscriber(STATUS.pattern(team=self._team), put),
+        ):
+            yield
+
+
+def _scans_placed(robot_map: RobotMap) -> int:
+    return sum(len(submap.trajectory.scan_index) for submap in robot_map.submaps)

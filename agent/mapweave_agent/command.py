@@ -1,0 +1,99 @@
+"""``mapweave agent``: the process of one robot."""
+
+import argparse
+import logging
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from mapweave_protocol.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.keys import new_boot
+from mapweave_protocol.session import open_session
+from mapweave_protocol.stopping import stop_on_signal
+
+from mapweave.cli import Command
+from mapweave.fusion import align_robots
+from mapweave.mapper import Mapper
+from mapweave.names import check_id
+from mapweave_agent.agent import Agent
+from mapweave_agent.comparer import Comparer
+from mapweave_agent.planning import AgentParameters
+from mapweave_agent.source import LogSource, Pace, ScanRange, parse_rate
+
+T = TypeVar("T")
+_log = logging.getLogger(__name__)
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--robot", required=True, metavar="ID", help="the robot's id")
+    parser.add_argument("--log", required=True, type=Path, help="the laser log to play")
+    parser.add_argument(
+        "--rate",
+        type=_typed(parse_rate),
+        default="1",
+        metavar="X",
+        help="how many times real time the log is played, or max (default 1)",
+    )
+    parser.add_argument(
+        "--scans",
+        type=_typed(ScanRange.parse),
+        default=":",
+        metavar="A:B",
+        help="which scans, counted from 0, B not included",
+    )
+    parser.add_argument(
+        "--map-interval",
+        type=_typed(_seconds),
+        default=AgentParameters().map_interval,
+        metavar="S",
+        help="least time between two messages of the growing submap [s] (default %(default)g)",
+    )
+    add_connection_arguments(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    logging.basicConfig(
+        stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S"
+    )
+    robot = check_id("robot", options.robot)
+    team, endpoints = connection_of(options)
+    pace = Pace(options.rate)
+    # Everything that can be wrong with the input is found before anybody hears of the robot.
+    source = LogSource.open(options.log, options.scans, _log.warning)
+
+    def tell_waiting() -> None:
+        _log.info("waiting for a router at %s", ", ".join(endpoints))
+
+    with (
+        Comparer(align_robots) as comparer,
+        open_session(endpoints, on_wait=tell_waiting) as session,
+    ):
+        mapper = Mapper(robot, new_boot())
+        parameters = AgentParameters(map_interval=options.map_interval)
+        agent = Agent(session, team, mapper, comparer, source.total, parameters)
+        agent.run(source.scans(), pace, stop_on_signal())
+    return 0
+
+
+def _typed(parse: Callable[[str], T]) -> Callable[[str], T]:
+    """Return `parse` with its message as argparse shows it."""
+
+    def parse_argument(text: str) -> T:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return parse_argument
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0 < seconds < math.inf:
+        raise ValueError(f"{text!r}: expected seconds, more than 0")
+    return seconds
+
+
+command = Command("map the scans of one robot, and compare with its team", _configure, _run)

@@ -1,0 +1,97 @@
+"""What a robot publishes, counted."""
+
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import ExitStack
+from types import TracebackType
+
+import zenoh
+import zenoh.ext as ze
+from mapweave_protocol.assembler import MapSender
+from mapweave_protocol.codec import encode
+from mapweave_protocol.keys import ALIGNMENT, LIVE, MAP, STATUS
+from mapweave_protocol.messages import AlignmentMessage, StatusMessage, Traffic
+from mapweave_protocol.session import declare_alignment_publisher, declare_map_publisher
+
+from mapweave.maps import RobotMap
+
+
+class Outbox:
+    """The publishers and the liveliness token of a run of a robot; a context manager.
+
+    Parameters
+    ----------
+    session
+        Stays the caller's.
+    """
+
+    def __init__(self, session: zenoh.Session, team: str, robot: str, boot: str) -> None:
+        self._session = session
+        self._team = team
+        self._robot = robot
+        self._boot = boot
+        self._sender = MapSender()
+        self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
+        self._messages: Counter[str] = Counter()
+        self._bytes: Counter[str] = Counter()
+        self._declared = ExitStack()
+
+    def __enter__(self) -> "Outbox":
+        with ExitStack() as stack:
+            keep = stack.enter_context
+            map_key = MAP.build(team=self._team, robot=self._robot)
+            status_key = STATUS.build(team=self._team, robot=self._robot)
+            live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
+            self._maps = keep(declare_map_publisher(self._session, map_key))
+            self._statuses = keep(
+                self._session.declare_publisher(
+                    status_key, congestion_control=zenoh.CongestionControl.DROP
+                )
+            )
+            # Last, so that who sees the robot can already hear it.
+            keep(self._session.liveliness().declare_token(live_key))
+            self._declared = stack.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._declared.close()
+
+    @property
+    def sent(self) -> Mapping[str, Traffic]:
+        """What was published so far, by kind."""
+        return {
+            kind: Traffic(messages=count, bytes=self._bytes[kind])
+            for kind, count in self._messages.items()
+        }
+
+    def send_map(self, robot_map: RobotMap, *, complete: bool) -> None:
+        """Publish a version of the map, or all of it if `complete`."""
+        self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
+
+    def send_alignments(self, message: AlignmentMessage) -> None:
+        """Publish what was found out about a pair of robots."""
+        pair = message.reference.robot, message.other.robot
+        publisher = self._alignments.get(pair)
+        if publisher is None:
+            key = ALIGNMENT.build(
+                team=self._team, robot=self._robot, reference=pair[0], other=pair[1]
+            )
+            publisher = declare_alignment_publisher(self._session, key)
+            self._alignments[pair] = self._declared.enter_context(publisher)
+        self._put("alignment", publisher, encode(message))
+
+    def send_status(self, message: StatusMessage) -> None:
+        """Publish how far the robot is."""
+        self._put("status", self._statuses, encode(message))
+
+    def _put(
+        self, kind: str, publisher: ze.AdvancedPublisher | zenoh.Publisher, payload: bytes
+    ) -> None:
+        publisher.put(payload)
+        self._messages[kind] += 1
+        self._bytes[kind] += len(payload)
