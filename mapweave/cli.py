@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"mapweave {version('mapweave')}")  # noqa: T201
         return 0
     if not words or words[0] in ("-h", "--help"):
-        print(_overview(sorted(points)), file=sys.stdout if words else sys.stderr)  # noqa: T201
+        print(_overview(sorted(points)), file=sys.stdout if words else sys.stderr)
         return 0 if words else EXIT_USAGE
     if words[0] not in points:
         known = ", ".join(sorted(points))

@@ -41,7 +41,7 @@ def scan_free_space(scan: Scan, pose: FloatArray, parameters: FreeSpaceParameter
     fans = [
         Polygon(np.vstack([np.zeros(2), rim[first:last]]))
         for first, last in _positive_runs(reach)
-        if last - first >= 2  # noqa: PLR2004  one beam has no area
+        if last - first >= 2
     ]
     sight = shapely.union_all(shapely.make_valid(fans)) if fans else Polygon()
     placed = shapely.transform(sight, lambda points: se2.transform_points(pose, points))
@@ -65,7 +65,7 @@ def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:
 
 def from_rings(outlines: Iterable[FloatArray]) -> BaseGeometry:
     """Return the union of simple polygons (k, 2) [m]; the inverse of `rings`."""
-    polygons = [Polygon(ring) for ring in outlines if len(ring) >= 3]  # noqa: PLR2004
+    polygons = [Polygon(ring) for ring in outlines if len(ring) >= 3]
     return shapely.union_all(shapely.make_valid(polygons)) if polygons else Polygon()
 
 

@@ -125,7 +125,7 @@ def partners(
     infinite and the index ``len(target.surface)``.
     """
     distance, index = target.tree.query(_features(moving, parameters), distance_upper_bound=reach)
-    return distance, index
+    return np.asarray(distance, dtype=np.float64), np.asarray(index, dtype=np.int64)
 
 
 def _features(surface: Surface, parameters: IcpParameters) -> FloatArray:

@@ -39,4 +39,6 @@ class Scan:
     @property
     def points(self) -> FloatArray:
         """(n, 2) where each beam ended [m], NaN where nothing came back."""
-        return self.ranges[:, None] * np.column_stack([np.cos(self.angles), np.sin(self.angles)])
+        bearing = np.column_stack([np.cos(self.angles), np.sin(self.angles)])
+        points: FloatArray = self.ranges[:, None] * bearing
+        return points

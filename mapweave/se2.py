@@ -58,10 +58,10 @@ def rotation(theta: float) -> FloatArray:
 def transform_points(pose: ArrayLike, points: ArrayLike) -> FloatArray:
     """Return ``(..., 2)`` `points` [m], given in the frame at `pose` ``(3,)``, in its parent."""
     p = np.asarray(pose, dtype=float)
-    return np.asarray(points, dtype=float) @ rotation(p[2]).T + p[:2]
+    return np.asarray(np.asarray(points, dtype=float) @ rotation(p[2]).T + p[:2])
 
 
 def transform_segments(pose: ArrayLike, segments: ArrayLike) -> FloatArray:
-    """Return ``(n, 4)`` `segments` (x1 y1 x2 y2) [m], given in the frame at `pose`, in its parent."""
+    """Return ``(n, 4)`` `segments` [m], given in the frame at `pose` ``(3,)``, in its parent."""
     s = np.asarray(segments, dtype=float)
-    return transform_points(pose, s.reshape(-1, 2)).reshape(s.shape)
+    return np.asarray(transform_points(pose, s.reshape(-1, 2)).reshape(s.shape))

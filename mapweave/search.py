@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from scipy.ndimage import distance_transform_edt
 
 from mapweave import se2
-from mapweave.arrays import FloatArray, IntArray
+from mapweave.arrays import Float32Array, FloatArray, IntArray
 
 
 class SearchParameters(BaseModel):
@@ -51,7 +51,7 @@ class NearnessRaster:
     origin: FloatArray
     centre: FloatArray
     cell: float
-    value: np.ndarray[tuple[int, ...], np.dtype[np.float32]]
+    value: Float32Array
 
     @classmethod
     def of(cls, points: FloatArray, centre: FloatArray, p: SearchParameters) -> "NearnessRaster":
@@ -105,7 +105,7 @@ def search(
 
 def _translation_scores(
     rotated: FloatArray, raster: NearnessRaster, shifts: FloatArray
-) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+) -> Float32Array:
     """(s, s) mean nearness of `rotated` (n, 2) moved by each pair of `shifts` (s, 2) [m]."""
     outside = raster.value.shape[0] - 1
     base: IntArray = np.rint((shifts - raster.origin) / raster.cell).astype(np.int64)
@@ -114,12 +114,11 @@ def _translation_scores(
     row = base[:, 1, None] + cells[None, :, 1]
     column[(column < 0) | (column > outside)] = outside
     row[(row < 0) | (row > outside)] = outside
-    return raster.value[column[:, None, :], row[None, :, :]].mean(axis=-1)
+    scores: Float32Array = raster.value[column[:, None, :], row[None, :, :]].mean(axis=-1)
+    return scores
 
 
-def _separate_maxima(
-    scores: np.ndarray[tuple[int, ...], np.dtype[np.float32]], count: int
-) -> list[tuple[int, int, int]]:
+def _separate_maxima(scores: Float32Array, count: int) -> list[tuple[int, int, int]]:
     """Indices of the highest scores, each at least 4 turns or 3 shifts from the better ones."""
     left = scores.copy()
     found: list[tuple[int, int, int]] = []

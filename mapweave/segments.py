@@ -7,6 +7,7 @@ visible side, on its left.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -79,7 +80,7 @@ def extract_segments(scan: Scan, parameters: SegmentParameters | None = None) ->
 
 
 def fit_segment(points: FloatArray) -> FloatArray:
-    """Return the (4,) total-least-squares segment of (k, 2) `points`, directed along their order."""
+    """Return the (4,) total-least-squares segment of (k, 2) `points`, along their order."""
     centre = points.mean(axis=0)
     offsets = points - centre
     (xx, xy), (_, yy) = offsets.T @ offsets
@@ -97,7 +98,7 @@ def _breaks(scan: Scan, used: IntArray, points: FloatArray, p: SegmentParameters
     turn = np.diff(scan.angles[used])
     nearer = np.minimum(scan.ranges[used][1:], scan.ranges[used][:-1])
     limit = np.maximum(p.max_jump, nearer * turn / np.sin(p.grazing))
-    skipped = np.diff(used) > 3  # noqa: PLR2004  a few lost beams do not end a surface
+    skipped = np.diff(used) > 3
     broken: BoolArray = (steps > np.minimum(limit, 4 * p.max_jump)) | skipped
     return broken
 
@@ -107,7 +108,7 @@ def _runs(breaks: BoolArray, count: int) -> list[tuple[int, int]]:
     if count == 0:
         return []
     edges = [0, *(np.flatnonzero(breaks) + 1).tolist(), count]
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(pairwise(edges))
 
 
 def _straight_pieces(
@@ -118,7 +119,7 @@ def _straight_pieces(
     stack = [(first, last)]
     while stack:
         a, b = stack.pop()
-        if b - a <= 2:  # noqa: PLR2004  two points are straight
+        if b - a <= 2:
             pieces.append((a, b))
             continue
         chord = points[b - 1] - points[a]

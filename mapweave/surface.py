@@ -56,7 +56,8 @@ def join_surfaces(surfaces: list[Surface]) -> Surface:
 def left_normals(directions: FloatArray) -> FloatArray:
     """Return (n, 2) unit normals on the left, the visible side, of (n, 2) `directions`."""
     lengths = np.maximum(np.hypot(directions[:, 0], directions[:, 1]), 1e-12)
-    return np.column_stack([-directions[:, 1], directions[:, 0]]) / lengths[:, None]
+    normals: FloatArray = np.column_stack([-directions[:, 1], directions[:, 0]]) / lengths[:, None]
+    return normals
 
 
 def scan_surface(scan: Scan, segments: ScanSegments, max_range: float) -> Surface:
@@ -68,7 +69,7 @@ def scan_surface(scan: Scan, segments: ScanSegments, max_range: float) -> Surfac
     with np.errstate(invalid="ignore"):
         used = np.flatnonzero(scan.hits & (scan.ranges <= max_range))
     points = scan.points[used]
-    if len(used) < 2:  # noqa: PLR2004
+    if len(used) < 2:
         return Surface(np.empty((0, 2)), np.empty((0, 2)))
     directions = _neighbour_directions(points)
     label = segments.label[used]
@@ -79,21 +80,24 @@ def scan_surface(scan: Scan, segments: ScanSegments, max_range: float) -> Surfac
     return Surface(points[oriented], left_normals(directions[oriented]))
 
 
-def segment_surface(segments: FloatArray, spacing: float) -> Surface:
-    """Return oriented points every `spacing` [m] along (n, 4) directed `segments`."""
+def segment_surface(segments: FloatArray, spacing: float) -> tuple[Surface, IntArray]:
+    """Return oriented points about every `spacing` [m] along (n, 4) directed `segments`.
+
+    The second value tells which segment each point is on; each has one at least.
+    """
     directions = segments[:, 2:] - segments[:, :2]
     lengths = np.hypot(directions[:, 0], directions[:, 1])
     counts = np.maximum(1, np.round(lengths / spacing)).astype(np.int64)
     owner = np.repeat(np.arange(len(segments)), counts)
     rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     fraction = (rank + 0.5) / counts[owner]
-    return Surface(
-        segments[owner, :2] + fraction[:, None] * directions[owner], left_normals(directions)[owner]
-    )
+    points = segments[owner, :2] + fraction[:, None] * directions[owner]
+    return Surface(points, left_normals(directions)[owner]), owner
 
 
 def _neighbour_directions(points: FloatArray) -> FloatArray:
     """(n, 2) from the previous to the next return; zero where both are too far away."""
     forward = np.vstack([np.diff(points, axis=0), np.zeros((1, 2))])
     forward[np.hypot(*forward.T) > MAX_NEIGHBOUR_GAP] = 0
-    return forward + np.vstack([np.zeros((1, 2)), forward[:-1]])
+    directions: FloatArray = forward + np.vstack([np.zeros((1, 2)), forward[:-1]])
+    return directions

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
-from mapweave.arrays import FloatArray
+from mapweave.arrays import BoolArray, FloatArray
 from mapweave.icp import Fit, IcpParameters, Target, align, partners
 from mapweave.scan import Scan
 from mapweave.search import NearnessRaster, SearchParameters, search
@@ -179,9 +179,7 @@ class Tracker:
             float(through.mean()) if len(through) else 0.0,
         )
 
-    def _free_before(
-        self, points: FloatArray, pose: FloatArray
-    ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def _free_before(self, points: FloatArray, pose: FloatArray) -> BoolArray:
         """(n,) which `points`, tracking frame, the keyframes around `pose` saw through."""
         p = self.parameters
         near = sorted(self._keyframes, key=lambda k: float(np.hypot(*(k.pose - pose)[:2])))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mapweave.arrays import BoolArray, FloatArray
+from mapweave.arrays import BoolArray, FloatArray, IntArray
 from mapweave.scan import Scan
 
 
@@ -14,7 +14,8 @@ def clear_ranges(scan: Scan, max_range: float) -> FloatArray:
     """
     reach = np.minimum(np.nan_to_num(scan.ranges, nan=0.0), max_range)
     padded = np.concatenate([reach[:1], reach, reach[-1:]])
-    return np.minimum(np.minimum(padded[:-2], padded[1:-1]), padded[2:])
+    clear: FloatArray = np.minimum(np.minimum(padded[:-2], padded[1:-1]), padded[2:])
+    return clear
 
 
 def seen_through(
@@ -33,13 +34,13 @@ def seen_through(
     bearing = np.arctan2(points[:, 1], points[:, 0])
     beam = nearest_beam(scan, bearing)
     inside = (bearing >= scan.angles[0]) & (bearing <= scan.angles[-1])
-    return inside & (np.hypot(points[:, 0], points[:, 1]) < clear[beam] - margin)
+    before: BoolArray = np.hypot(points[:, 0], points[:, 1]) < clear[beam] - margin
+    return inside & before
 
 
-def nearest_beam(
-    scan: Scan, bearing: FloatArray
-) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+def nearest_beam(scan: Scan, bearing: FloatArray) -> IntArray:
     """Return (n,) which beam points nearest to each `bearing` [rad]."""
     spacing = (scan.angles[-1] - scan.angles[0]) / max(len(scan.angles) - 1, 1)
     beam = np.rint((bearing - scan.angles[0]) / spacing).astype(np.int64)
-    return np.clip(beam, 0, len(scan.angles) - 1)
+    nearest: IntArray = np.clip(beam, 0, len(scan.angles) - 1)
+    return nearest

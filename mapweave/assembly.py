@@ -1,0 +1,38 @@
+"""A component of a robot map as one line map: its submaps at their poses."""
+
+import numpy as np
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.maps import LineMap, RobotMap
+
+
+def place(line_map: LineMap, pose: FloatArray) -> LineMap:
+    """Return `line_map`, given in the frame at `pose` (3,), in that frame's parent."""
+    return LineMap(
+        se2.transform_segments(pose, line_map.segments),
+        line_map.polyline,
+        line_map.support,
+        tuple(se2.transform_points(pose, ring) for ring in line_map.free_space),
+    )
+
+
+def unite_lines(line_maps: list[LineMap]) -> LineMap:
+    """Return all lines and free space of `line_maps`, which share a frame, side by side."""
+    if not line_maps:
+        return LineMap.empty()
+    counts = [int(m.polyline[-1]) + 1 if len(m.polyline) else 0 for m in line_maps]
+    offsets = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    return LineMap(
+        np.concatenate([m.segments for m in line_maps]),
+        np.concatenate([m.polyline + k for m, k in zip(line_maps, offsets, strict=True)]),
+        np.concatenate([m.support for m in line_maps]),
+        tuple(ring for m in line_maps for ring in m.free_space),
+    )
+
+
+def assemble(robot_map: RobotMap, component: int) -> LineMap:
+    """Return all submaps of `component` in its frame, not merged."""
+    return unite_lines(
+        [place(s.map, s.pose) for s in robot_map.submaps if s.component == component]
+    )

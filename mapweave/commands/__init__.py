@@ -1,0 +1,1 @@
+"""The library's subcommands; each module offers one ``command``."""

@@ -1,0 +1,27 @@
+"""``mapweave export``: a map file as a picture or as geometry for other programs."""
+
+import argparse
+from pathlib import Path
+
+from mapweave.cli import Command
+from mapweave.export import EXPORT_SUFFIXES, check_export_suffix, export
+from mapweave.files import read_any
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("map", metavar="MAP.json", type=Path, help="a robot's map or a joint map")
+    parser.add_argument(
+        "output",
+        metavar="OUT",
+        type=Path,
+        help=f"the file to write, named {', '.join(f'*{suffix}' for suffix in EXPORT_SUFFIXES)}",
+    )
+
+
+def _run(options: argparse.Namespace) -> int:
+    check_export_suffix(options.output)
+    export(read_any(options.map), options.output)
+    return 0
+
+
+command = Command("Write a map as a picture (svg, png) or as geometry (geojson).", _configure, _run)

@@ -1,0 +1,92 @@
+"""``mapweave fuse``: robots' maps to a joint map."""
+
+import argparse
+from itertools import combinations
+from pathlib import Path
+
+from mapweave.assembly import assemble
+from mapweave.cli import Command
+from mapweave.errors import FileError
+from mapweave.files import read_map, write_joint
+from mapweave.fusion import align_robots
+from mapweave.joint import build_joint_map
+from mapweave.maps import Alignment, JointMap, RobotMap, component_name
+from mapweave.picture import check_picture_suffix, draw_joint
+from mapweave.progress import track
+
+EXIT_NOT_ALL_JOINED = 3
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("maps", metavar="MAP.json", type=Path, nargs="+", help="two or more maps")
+    parser.add_argument("--output", metavar="JOINT.json", type=Path, help="the joint map to write")
+    parser.add_argument("--plot", metavar="JOINT.png", type=Path, help="the picture (png, svg)")
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.plot:
+        check_picture_suffix(options.plot)
+    maps = _read_distinct(options.maps)
+    joint = fuse(list(maps.values()))
+    if options.output:
+        write_joint(options.output, joint)
+    if options.plot:
+        draw_joint(joint, options.plot, maps)
+    for line in tell(joint):
+        print(line)  # noqa: T201
+    return 0 if _all_robots_joined(joint, len(maps)) else EXIT_NOT_ALL_JOINED
+
+
+def _read_distinct(paths: list[Path]) -> dict[str, RobotMap]:
+    """Read maps; each is of another robot."""
+    maps: dict[str, RobotMap] = {}
+    for path in paths:
+        robot_map = read_map(path)
+        if robot_map.robot in maps:
+            raise FileError(
+                path,
+                f"robot {robot_map.robot!r} was given already; expected a map of another robot",
+            )
+        maps[robot_map.robot] = robot_map
+    return maps
+
+
+def fuse(maps: list[RobotMap]) -> JointMap:
+    """Compare all pairs of `maps` and join those that align."""
+    pairs = list(combinations(maps, 2))
+    alignments = [
+        a for first, second in track(pairs, "comparing") for a in align_robots(first, second)
+    ]
+    components = {component_name(m.robot, c): assemble(m, c) for m in maps for c in m.components}
+    return build_joint_map(components, alignments, version=1)
+
+
+def tell(joint: JointMap) -> list[str]:
+    """Return what was found, a line an alignment and a line a component."""
+    return [*map(_tell_alignment, joint.alignments), *_tell_components(joint)]
+
+
+def _tell_alignment(alignment: Alignment) -> str:
+    return (
+        f"{alignment.reference} - {alignment.other}: {alignment.decision}"
+        f" ({alignment.confidence:.0%}): {alignment.reason}"
+    )
+
+
+def _tell_components(joint: JointMap) -> list[str]:
+    return [
+        f"component of {', '.join(component.robots)}: {len(component.map.segments)} segments,"
+        f" confidence {component.confidence:.0%}"
+        for component in joint.components
+    ]
+
+
+def _all_robots_joined(joint: JointMap, robots: int) -> bool:
+    """Whether one component has a part of every robot."""
+    return any(
+        len({name.partition("/")[0] for name in component.robots}) == robots
+        for component in joint.components
+    )
+
+
+command = Command("Join robots' maps where their shapes prove it.", _configure, _run)

@@ -1,0 +1,107 @@
+"""``mapweave map``: a laser log to a robot's map."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from mapweave.cli import Command
+from mapweave.errors import FileError, MapweaveError
+from mapweave.files import write_map
+from mapweave.mapper import Mapper
+from mapweave.maps import RobotMap
+from mapweave.names import check_id
+from mapweave.picture import check_picture_suffix, draw_map
+from mapweave.progress import track
+from mapweave.readers import count_scans, read_scans
+from mapweave.scan import Scan
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("log", metavar="LOG", type=Path, help="CARMEN, TORO or g2o, may be gzipped")
+    parser.add_argument("--output", metavar="MAP.json", type=Path, help="the map file to write")
+    parser.add_argument("--robot", metavar="ID", default="r1", help="the robot's id (%(default)s)")
+    parser.add_argument(
+        "--scans", metavar="A:B", type=scan_range, default=slice(None), help="only scans A to B - 1"
+    )
+    parser.add_argument(
+        "--odometry", choices=["none", "prior"], default="none", help="use the log's odometry"
+    )
+    parser.add_argument(
+        "--plot", metavar="MAP.png", type=Path, help="the picture to write (png, svg)"
+    )
+
+
+def scan_range(text: str) -> slice:
+    """Return the scans that ``A:B`` names, both optional, counted from 0; for argparse."""
+    first, colon, last = text.partition(":")
+    try:
+        chosen = slice(int(first) if first else 0, int(last) if last else None)
+    except ValueError:
+        colon = ""
+    if not colon or chosen.start < 0 or (chosen.stop is not None and chosen.stop <= chosen.start):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected A:B with 0 <= A < B")
+    return chosen
+
+
+def _run(options: argparse.Namespace) -> int:
+    check_id("robot", options.robot)
+    if options.odometry == "prior":
+        raise MapweaveError("--odometry prior is not there yet; maps are made from scans alone")
+    if options.plot:
+        check_picture_suffix(options.plot)
+    robot_map, taken = _map_log(options.log, options.robot, options.scans)
+    if options.output:
+        write_map(options.output, robot_map)
+    if options.plot:
+        draw_map(robot_map, options.plot)
+    print(_summary(robot_map, taken))  # noqa: T201
+    return 0
+
+
+def _map_log(log: Path, robot: str, chosen: slice) -> tuple[RobotMap, int]:
+    """Map the chosen scans; return the map and how many scans there were."""
+    mapper = Mapper(robot)
+    total = len(range(*chosen.indices(count_scans(log)))) if sys.stderr.isatty() else None
+    taken = 0
+    for scan in track(_chosen_scans(log, chosen), f"mapping {log.name}", total):
+        mapper.add(scan)
+        taken += 1
+    robot_map = mapper.robot_map()
+    if not robot_map.submaps:
+        raise FileError(
+            log,
+            f"none of its {taken} chosen scans can be mapped; expected scans with"
+            " returns, and a range of scans that it has",
+        )
+    return robot_map, taken
+
+
+def _chosen_scans(log: Path, chosen: slice) -> Iterator[Scan]:
+    return islice(read_scans(log, on_warning=_warn), chosen.start, chosen.stop)
+
+
+def _warn(message: str) -> None:
+    print(f"mapweave: {message}", file=sys.stderr)  # noqa: T201
+
+
+def _summary(robot_map: RobotMap, taken: int) -> str:
+    sizes = dict.fromkeys(robot_map.components, 0)
+    for submap in robot_map.submaps:
+        sizes[submap.component] += len(submap.trajectory.scan_index)
+    segments = sum(len(submap.map.segments) for submap in robot_map.submaps)
+    path = sum(
+        float(np.hypot(*np.diff(submap.trajectory.pose[:, :2], axis=0).T).sum())
+        for submap in robot_map.submaps
+    )
+    return (
+        f"{sum(sizes.values())} of {taken} scans placed, {max(sizes.values())} in the largest of"
+        f" {len(sizes)} components; {path:.0f} m of path, {len(robot_map.submaps)} submaps,"
+        f" {segments} segments"
+    )
+
+
+command = Command("Map a laser log without odometry.", _configure, _run)

@@ -1,0 +1,211 @@
+"""Map fusion: the transform between two maps, or a reason why there is none (paper, VIII).
+
+Hypothesise by shape (H1, H2), align (V1), verify by what both maps saw (V2), decide. The best
+hypothesis must explain much wall, contradict little free space, be held in every direction, share
+a shape, and leave the best *different* hypothesis far behind. Each condition that fails is the
+reason given.
+"""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.assembly import assemble
+from mapweave.confidence import ConfidenceParameters, confidence
+from mapweave.hypotheses import HypothesisParameters, Shape, different, hypothesise
+from mapweave.icp import IcpParameters, Target, align
+from mapweave.map_raster import RasterParameters
+from mapweave.maps import Alignment, Decision, LineMap, RobotMap, component_name
+from mapweave.verification import Verdict, VerificationParameters, verify
+
+
+class FusionParameters(BaseModel):
+    """One model for each stage, and what an alignment must show to be accepted.
+
+    The limits were set on stretches of the Intel, CSAIL and Seattle logs.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    raster: RasterParameters = RasterParameters()
+    hypotheses: HypothesisParameters = HypothesisParameters()
+    verification: VerificationParameters = VerificationParameters()
+    coarse_icp: IcpParameters = IcpParameters(start_scale=0.5, end_scale=0.1)
+    fine_icp: IcpParameters = IcpParameters(start_scale=0.25, end_scale=0.06)
+    coarse_samples: int = Field(300, ge=10, description="of a map's walls, aligning hypotheses")
+    confidence: ConfidenceParameters = ConfidenceParameters()
+    min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
+    min_common: float = Field(6.0, gt=0, description="[m] of wall in common")
+    min_overlap: float = Field(
+        0.8, gt=0, le=1, description="of the wall that both looked at, the share in common"
+    )
+    min_held: float = Field(
+        2.5, gt=0, description="[m] of common wall across the weakest direction"
+    )
+    min_complexity: float = Field(
+        0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
+    )
+    max_rival: float = Field(
+        0.6, gt=0, lt=1, description="score of the best different hypothesis, as a share"
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypothesis:
+    """An aligned hypothesis with its verdict."""
+
+    transform: FloatArray
+    verdict: Verdict
+
+
+def align_robots(
+    reference: RobotMap, other: RobotMap, parameters: FusionParameters | None = None
+) -> list[Alignment]:
+    """Compare every component of `reference` with every one of `other`."""
+    p = parameters or FusionParameters()
+    ours = {
+        component_name(reference.robot, c): assemble(reference, c) for c in reference.components
+    }
+    theirs = {component_name(other.robot, c): assemble(other, c) for c in other.components}
+    shapes = {name: _shape(lines, p) for name, lines in {**ours, **theirs}.items()}
+    return [_compare(a, shapes[a], b, shapes[b], p) for a in ours for b in theirs]
+
+
+def align_maps(
+    reference: tuple[str, LineMap],
+    other: tuple[str, LineMap],
+    parameters: FusionParameters | None = None,
+) -> Alignment:
+    """Find the transform from `other` to `reference`, each a component's name and its lines."""
+    p = parameters or FusionParameters()
+    (a, first), (b, second) = reference, other
+    return _compare(a, _shape(first, p), b, _shape(second, p), p)
+
+
+def _shapes(robot_map: RobotMap, p: FusionParameters) -> dict[str, Shape | None]:
+    """Prepare every component, by name."""
+    return {
+        component_name(robot_map.robot, c): _shape(assemble(robot_map, c), p)
+        for c in robot_map.components
+    }
+
+
+def _shape(lines: LineMap, p: FusionParameters) -> Shape | None:
+    """Prepare `lines`; None where there is too little wall to compare."""
+    wall = np.hypot(*(lines.segments[:, 2:] - lines.segments[:, :2]).T).sum()
+    return Shape.of(lines, p.hypotheses, p.raster) if wall >= p.min_wall else None
+
+
+def _compare(
+    a: str, first: Shape | None, b: str, second: Shape | None, p: FusionParameters
+) -> Alignment:
+    if first is None or second is None:
+        poor = a if first is None else b
+        return _no_alignment(a, b, f"{poor} has less than {p.min_wall:g} m of wall to compare")
+    ranked = find_alignments(first, second, p)
+    if not ranked:
+        return _no_alignment(a, b, "no part of one has the shape of a part of the other")
+    best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
+    decision, reason = decide(best, rival, p)
+    return Alignment(
+        a,
+        b,
+        best.transform,
+        decision,
+        confidence(best.verdict, rival.verdict if rival else None, p.confidence),
+        reason,
+        _numbers(best.verdict),
+        None if rival is None else _runner_up(best, rival),
+    )
+
+
+def find_alignments(first: Shape, second: Shape, p: FusionParameters) -> list[Hypothesis]:
+    """Return the best hypothesis and the best different one, where there are any."""
+    transforms, _ = hypothesise(first, second, p.hypotheses, p.verification)
+    if len(transforms) == 0:
+        return []
+    target = Target.of(first.raster.surface, p.coarse_icp)
+    aligned = np.array(
+        [_refine(second, target, t, p.coarse_icp, p.coarse_samples) for t in transforms]
+    )
+    verdicts = [_verdict(first, second, t, p) for t in aligned]
+    scores = np.array([v.score for v in verdicts])
+    middle = second.raster.surface.points.mean(axis=0)
+    leaders = different(aligned, scores, middle, p.hypotheses)[:2]
+    fine = [
+        _refine(second, target, aligned[k], p.fine_icp, len(second.raster.weight)) for k in leaders
+    ]
+    found = [Hypothesis(t, _verdict(first, second, t, p)) for t in fine]
+    return sorted(found, key=lambda h: -h.verdict.score)
+
+
+def decide(best: Hypothesis, rival: Hypothesis | None, p: FusionParameters) -> tuple[Decision, str]:
+    """Return the decision and one sentence that gives the reason."""
+    v = best.verdict
+    found = f"{v.common:.0f} m of wall in common, {v.contradicted:.1f} m contradicted"
+    if v.common < p.min_common:
+        return "refused", f"only {v.common:.1f} m of wall in common"
+    if v.overlap < p.min_overlap:
+        return (
+            "refused",
+            f"{v.common:.0f} m of wall in common, but {v.contradicted:.0f} m of wall"
+            " where the other saw free space",
+        )
+    if v.held < p.min_held:
+        return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
+    if v.complexity < p.min_complexity:
+        return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
+    if rival is None:
+        return "accepted", f"{found}; nothing else fits"
+    elsewhere = _difference(best.transform, rival.transform)
+    if rival.verdict.score > p.max_rival * v.score:
+        return "ambiguous", f"{found}; but {elsewhere} explains {rival.verdict.score:.0f} m as well"
+    return "accepted", f"{found}; next best, {elsewhere}, explains {_explains(rival.verdict)}"
+
+
+def _explains(verdict: Verdict) -> str:
+    return f"{verdict.score:.0f} m" if verdict.score >= 1 else "nothing"
+
+
+def _difference(best: FloatArray, rival: FloatArray) -> str:
+    """How the rival differs, in words."""
+    x, y, turn = se2.between(best, rival)
+    distance = f"{np.hypot(x, y):.0f} m away"
+    degrees = abs(np.degrees(turn))
+    return distance if degrees < 9 else f"{distance} and turned by {degrees:.0f}°"
+
+
+def _refine(
+    other: Shape, target: Target, start: FloatArray, icp: IcpParameters, samples: int
+) -> FloatArray:
+    """Align the walls of `other` to `target` (V1), from at most about `samples` points."""
+    surface = other.raster.surface
+    stride = max(1, len(surface) // samples)
+    return align(surface.at(slice(None, None, stride)), target, start, icp).pose
+
+
+def _verdict(first: Shape, second: Shape, transform: FloatArray, p: FusionParameters) -> Verdict:
+    return verify(first.raster, second.raster, transform, second.lines, p.verification)
+
+
+def _numbers(verdict: Verdict) -> dict[str, float]:
+    """The evidence by name, with the score."""
+    numbers = {k: float(v) for k, v in asdict(verdict).items() if k != "contradiction_weight"}
+    return {**numbers, "score": verdict.score}
+
+
+def _runner_up(best: Hypothesis, rival: Hypothesis) -> dict[str, object]:
+    x, y, turn = se2.between(best.transform, rival.transform)
+    return {
+        "transform": [float(v) for v in rival.transform],
+        "distance": float(np.hypot(x, y)),
+        "turn": float(abs(turn)),
+        **_numbers(rival.verdict),
+    }
+
+
+def _no_alignment(a: str, b: str, reason: str) -> Alignment:
+    return Alignment(a, b, np.zeros(3), "refused", 0.0, reason)

@@ -1,0 +1,194 @@
+"""Verification: what two maps say of a transform between them (paper, VIII, V2, and beyond).
+
+The paper confirms an alignment when parts of both maps are close in the Hausdorff sense and one
+of their polylines is complex enough. Look-alike places pass that test, so free space votes too:
+wall of one map where the other saw through is a contradiction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave import se2
+from mapweave.arrays import BoolArray, FloatArray
+from mapweave.map_raster import MapRaster
+from mapweave.maps import LineMap
+from mapweave.tangent_space import complexity
+
+
+class VerificationParameters(BaseModel):
+    """When walls coincide and when they contradict."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    closeness: float = Field(
+        0.25, gt=0, description="[m] Hausdorff distance below which walls coincide"
+    )
+    min_cosine: float = Field(
+        0.8, gt=0, le=1, description="of the angle between normals of coinciding walls: 37°"
+    )
+    clearance: float = Field(
+        0.3,
+        gt=0,
+        description="[m] inside seen free space from which a wall contradicts; covers"
+        " what two maps are bent against each other",
+    )
+    contradiction_weight: float = Field(
+        1.0, gt=0, description="metres in common that a metre contradicted outweighs"
+    )
+    shared_part: float = Field(
+        0.8, gt=0, le=1, description="share of a segment that coincides, to count as shared"
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What speaks for and against one transform.
+
+    Attributes
+    ----------
+    common
+        [m] of wall in both maps: the smaller of the two counts.
+    contradicted
+        [m] of wall, of both maps, that the other saw through.
+    overlap
+        Share of the wall of either map that lies where the other looked and that coincides.
+    residual
+        [m] median distance of coinciding walls.
+    held
+        [m] of common wall that hold the least held direction.
+    complexity
+        [rad²] greatest sc(P) of a shared polyline (V2).
+    """
+
+    common: float
+    contradicted: float
+    overlap: float
+    residual: float
+    held: float
+    complexity: float
+    contradiction_weight: float
+
+    @property
+    def score(self) -> float:
+        """[m] of wall in common less wall contradicted."""
+        return self.common - self.contradiction_weight * self.contradicted
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OneWay:
+    """The samples of one map in the other: (n,) masks and weighted sums."""
+
+    coincides: BoolArray
+    distance: FloatArray
+    common: float
+    contradicted: float
+
+
+def coarse_scores(
+    reference: MapRaster,
+    other: MapRaster,
+    transforms: FloatArray,
+    max_samples: int,
+    parameters: VerificationParameters,
+) -> FloatArray:
+    """Return (k,) metres in common less contradicted for (k, 3) `transforms`, from few samples."""
+    forward = _coarse_one_way(reference, other, transforms, max_samples, parameters)
+    backward = _coarse_one_way(other, reference, se2.inverse(transforms), max_samples, parameters)
+    return np.asarray(forward + backward) / 2
+
+
+def _coarse_one_way(
+    reference: MapRaster,
+    other: MapRaster,
+    transforms: FloatArray,
+    max_samples: int,
+    p: VerificationParameters,
+) -> FloatArray:
+    stride = 1 + (len(other.weight) - 1) // max_samples
+    sample = other.surface.at(slice(None, None, stride))
+    weight = other.weight[::stride] * (other.weight.sum() / other.weight[::stride].sum())
+    c, s = np.cos(transforms[:, 2, None]), np.sin(transforms[:, 2, None])
+    (x, y), (u, v) = sample.points.T, sample.normals.T
+    placed = np.stack(
+        [c * x - s * y + transforms[:, 0, None], s * x + c * y + transforms[:, 1, None]], axis=-1
+    )
+    nearest, distance, depth = reference.look_up(placed)
+    theirs = reference.surface.normals[nearest]
+    cosine = (c * u - s * v) * theirs[..., 0] + (s * u + c * v) * theirs[..., 1]
+    near = distance < p.closeness
+    gain = near & (cosine > p.min_cosine)
+    loss = ~near & (depth > p.clearance)
+    scores: FloatArray = (gain - p.contradiction_weight * loss) @ weight
+    return scores
+
+
+def verify(
+    reference: MapRaster,
+    other: MapRaster,
+    transform: FloatArray,
+    lines: LineMap,
+    parameters: VerificationParameters,
+) -> Verdict:
+    """Return what both maps say of `transform` (3,) from `other` to `reference`.
+
+    Parameters
+    ----------
+    lines
+        The line map that `other` is the raster of.
+    """
+    forward = _one_way(reference, other, transform, parameters)
+    backward = _one_way(other, reference, se2.inverse(transform), parameters)
+    contradicted = forward.contradicted + backward.contradicted
+    common = min(forward.common, backward.common)
+    return Verdict(
+        common,
+        contradicted,
+        common / max(common + contradicted, 1e-9),
+        float(np.median(forward.distance)) if len(forward.distance) else np.inf,
+        _held(other, forward.coincides),
+        _shared_complexity(other, forward.coincides, lines, parameters.shared_part),
+        parameters.contradiction_weight,
+    )
+
+
+def _one_way(
+    reference: MapRaster, other: MapRaster, transform: FloatArray, p: VerificationParameters
+) -> _OneWay:
+    """Look the samples of `other` up in `reference`."""
+    placed = other.surface.moved(transform)
+    nearest, distance, depth = reference.look_up(placed.points)
+    cosine = np.einsum("ij,ij->i", placed.normals, reference.surface.normals[nearest])
+    near = distance < p.closeness
+    coincides = near & (cosine > p.min_cosine)
+    _, _, own_depth = other.look_up(other.surface.points)
+    # What its own map saw through later was no wall for long: it refutes nothing.
+    contradicts = ~near & (depth > p.clearance) & (own_depth < p.clearance)
+    return _OneWay(
+        coincides,
+        distance[coincides].astype(np.float64),
+        float(other.weight[coincides].sum()),
+        float(other.weight[contradicts].sum()),
+    )
+
+
+def _held(other: MapRaster, coincides: BoolArray) -> float:
+    """[m] of coinciding wall that hold the weakest direction of translation."""
+    normals = other.surface.normals[coincides]
+    scatter = (normals * other.weight[coincides, None]).T @ normals
+    return float(np.linalg.eigvalsh(scatter)[0])
+
+
+def _shared_complexity(
+    other: MapRaster, coincides: BoolArray, lines: LineMap, shared_part: float
+) -> float:
+    """Greatest shape complexity among the polylines of the shared part (V2) [rad²]."""
+    counts = np.bincount(other.segment, minlength=len(lines.segments))
+    hits = np.bincount(other.segment[coincides], minlength=len(lines.segments))
+    shared = hits >= shared_part * np.maximum(counts, 1)
+    parts = [
+        lines.segments[shared & (lines.polyline == name)]
+        for name in np.unique(lines.polyline[shared])
+    ]
+    return max((complexity(part) for part in parts), default=0.0)
