@@ -69,7 +69,10 @@ class Story:
         if state.submaps != before:
             parts = len(robot_map.components)
             pieces = f" in {parts} components" if parts > 1 else ""
-            yield f"{robot_map.robot}: {state.submaps} submaps{pieces}, {state.segments} segments"
+            yield (
+                f"{robot_map.robot}: {_count(state.submaps, 'submap')}{pieces},"
+                f" {_count(state.segments, 'segment')}"
+            )
 
     def aligned(self, message: AlignmentMessage) -> Iterator[str]:
         """Tell each decision that is new."""
@@ -93,3 +96,7 @@ class Story:
 
     def _robot(self, robot: str) -> RobotState:
         return self.robots.setdefault(robot, RobotState())
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
