@@ -9,9 +9,8 @@ from collections.abc import Iterable
 import numpy as np
 import shapely
 from pydantic import BaseModel, ConfigDict, Field
-from shapely.geometry import LineString, MultiPolygon, Polygon
+from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
-from shapely.ops import split
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
@@ -84,7 +83,9 @@ def _without_holes(polygon: Polygon) -> list[Polygon]:
     """Cut `polygon` through its first hole until no piece has one."""
     if not polygon.interiors:
         return [polygon]
-    x = Polygon(polygon.interiors[0]).representative_point().x
-    _, low, _, high = polygon.bounds
-    cut = split(polygon, LineString([(x, low - 1), (x, high + 1)]))
-    return [piece for part in _polygons(cut) for piece in _without_holes(part)]
+    left, bottom, right, top = polygon.bounds
+    hole_left, _, hole_right, _ = polygon.interiors[0].bounds
+    middle = (hole_left + hole_right) / 2
+    halves = (box(left, bottom, middle, top), box(middle, bottom, right, top))
+    cut = [part for half in halves for part in _polygons(shapely.intersection(polygon, half))]
+    return [piece for part in cut for piece in _without_holes(part)]

@@ -19,7 +19,7 @@ from mapweave.hypotheses import HypothesisParameters, Shape, different, hypothes
 from mapweave.icp import IcpParameters, Target, align
 from mapweave.map_raster import RasterParameters
 from mapweave.maps import Alignment, Decision, LineMap, RobotMap, component_name
-from mapweave.verification import Verdict, VerificationParameters, verify
+from mapweave.verification import Verdict, VerificationParameters, shared_complexity, verify
 
 
 class FusionParameters(BaseModel):
@@ -55,10 +55,11 @@ class FusionParameters(BaseModel):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """An aligned hypothesis with its verdict."""
+    """An aligned hypothesis with its verdict and the complexity [rad²] of what is shared (V2)."""
 
     transform: FloatArray
     verdict: Verdict
+    complexity: float
 
 
 def align_robots(
@@ -117,7 +118,7 @@ def _compare(
         decision,
         confidence(best.verdict, rival.verdict if rival else None, p.confidence),
         reason,
-        _numbers(best.verdict),
+        _numbers(best),
         None if rival is None else _runner_up(best, rival),
     )
 
@@ -138,7 +139,9 @@ def find_alignments(first: Shape, second: Shape, p: FusionParameters) -> list[Hy
     fine = [
         _refine(second, target, aligned[k], p.fine_icp, len(second.raster.weight)) for k in leaders
     ]
-    found = [Hypothesis(t, _verdict(first, second, t, p)) for t in fine]
+    found = [
+        Hypothesis(t, _verdict(first, second, t, p), _complexity(first, second, t, p)) for t in fine
+    ]
     return sorted(found, key=lambda h: -h.verdict.score)
 
 
@@ -156,7 +159,7 @@ def decide(best: Hypothesis, rival: Hypothesis | None, p: FusionParameters) -> t
         )
     if v.held < p.min_held:
         return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
-    if v.complexity < p.min_complexity:
+    if best.complexity < p.min_complexity:
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
     if rival is None:
         return "accepted", f"{found}; nothing else fits"
@@ -188,13 +191,18 @@ def _refine(
 
 
 def _verdict(first: Shape, second: Shape, transform: FloatArray, p: FusionParameters) -> Verdict:
-    return verify(first.raster, second.raster, transform, second.lines, p.verification)
+    return verify(first.raster, second.raster, transform, p.verification)
 
 
-def _numbers(verdict: Verdict) -> dict[str, float]:
+def _complexity(first: Shape, second: Shape, transform: FloatArray, p: FusionParameters) -> float:
+    return shared_complexity(first.raster, second.raster, transform, second.lines, p.verification)
+
+
+def _numbers(hypothesis: Hypothesis) -> dict[str, float]:
     """The evidence by name, with the score."""
+    verdict = hypothesis.verdict
     numbers = {k: float(v) for k, v in asdict(verdict).items() if k != "contradiction_weight"}
-    return {**numbers, "score": verdict.score}
+    return {**numbers, "complexity": hypothesis.complexity, "score": verdict.score}
 
 
 def _runner_up(best: Hypothesis, rival: Hypothesis) -> dict[str, object]:
@@ -203,7 +211,7 @@ def _runner_up(best: Hypothesis, rival: Hypothesis) -> dict[str, object]:
         "transform": [float(v) for v in rival.transform],
         "distance": float(np.hypot(x, y)),
         "turn": float(abs(turn)),
-        **_numbers(rival.verdict),
+        **_numbers(rival),
     }
 
 

@@ -111,11 +111,21 @@ def fill_polygons(
     filled = np.zeros(tuple(shape), dtype=np.bool_)
     for polygon in polygons:
         corners = (polygon - origin) / cell - 0.5  # cell centres at whole numbers
-        row, column = _crossings(corners, np.roll(corners, -1, axis=0), int(shape[0]))
-        toggles = np.zeros((int(shape[0]), int(shape[1]) + 1), dtype=np.int32)
-        np.add.at(toggles, (row, np.clip(np.ceil(column), 0, shape[1]).astype(np.int64)), 1)
-        filled |= (np.cumsum(toggles, axis=1)[:, :-1] % 2).astype(np.bool_)
+        low = np.clip(np.floor(corners.min(axis=0)), 0, shape).astype(np.int64)
+        high = np.clip(np.ceil(corners.max(axis=0)) + 1, 0, shape).astype(np.int64)
+        if (high > low).all():
+            window = filled[low[0] : high[0], low[1] : high[1]]
+            window |= _inside(corners - low, high - low)
     return filled
+
+
+def _inside(corners: FloatArray, shape: IntArray) -> BoolArray:
+    """Tell which whole numbers (row, column) of `shape` lie in the polygon of (k, 2) `corners`."""
+    row, column = _crossings(corners, np.roll(corners, -1, axis=0), int(shape[0]))
+    toggles = np.zeros((int(shape[0]), int(shape[1]) + 1), dtype=np.int32)
+    np.add.at(toggles, (row, np.clip(np.ceil(column), 0, shape[1]).astype(np.int64)), 1)
+    inside: BoolArray = np.cumsum(toggles, axis=1)[:, :-1] % 2 == 1
+    return inside
 
 
 def _crossings(start: FloatArray, end: FloatArray, rows: int) -> tuple[IntArray, FloatArray]:

@@ -58,8 +58,6 @@ class Verdict:
         [m] median distance of coinciding walls.
     held
         [m] of common wall that hold the least held direction.
-    complexity
-        [rad²] greatest sc(P) of a shared polyline (V2).
     """
 
     common: float
@@ -67,7 +65,6 @@ class Verdict:
     overlap: float
     residual: float
     held: float
-    complexity: float
     contradiction_weight: float
 
     @property
@@ -128,16 +125,9 @@ def verify(
     reference: MapRaster,
     other: MapRaster,
     transform: FloatArray,
-    lines: LineMap,
     parameters: VerificationParameters,
 ) -> Verdict:
-    """Return what both maps say of `transform` (3,) from `other` to `reference`.
-
-    Parameters
-    ----------
-    lines
-        The line map that `other` is the raster of.
-    """
+    """Return what both maps say of `transform` (3,) from `other` to `reference`."""
     forward = _one_way(reference, other, transform, parameters)
     backward = _one_way(other, reference, se2.inverse(transform), parameters)
     contradicted = forward.contradicted + backward.contradicted
@@ -148,9 +138,33 @@ def verify(
         common / max(common + contradicted, 1e-9),
         float(np.median(forward.distance)) if len(forward.distance) else np.inf,
         _held(other, forward.coincides),
-        _shared_complexity(other, forward.coincides, lines, parameters.shared_part),
         parameters.contradiction_weight,
     )
+
+
+def shared_complexity(
+    reference: MapRaster,
+    other: MapRaster,
+    transform: FloatArray,
+    lines: LineMap,
+    parameters: VerificationParameters,
+) -> float:
+    """Return the greatest sc(P) [rad²] among the polylines of the shared part (paper, V2).
+
+    Parameters
+    ----------
+    lines
+        The line map that `other` is the raster of.
+    """
+    coincides = _one_way(reference, other, transform, parameters).coincides
+    counts = np.bincount(other.segment, minlength=len(lines.segments))
+    hits = np.bincount(other.segment[coincides], minlength=len(lines.segments))
+    shared = hits >= parameters.shared_part * np.maximum(counts, 1)
+    parts = [
+        lines.segments[shared & (lines.polyline == name)]
+        for name in np.unique(lines.polyline[shared])
+    ]
+    return max((complexity(part) for part in parts), default=0.0)
 
 
 def _one_way(
@@ -178,17 +192,3 @@ def _held(other: MapRaster, coincides: BoolArray) -> float:
     normals = other.surface.normals[coincides]
     scatter = (normals * other.weight[coincides, None]).T @ normals
     return float(np.linalg.eigvalsh(scatter)[0])
-
-
-def _shared_complexity(
-    other: MapRaster, coincides: BoolArray, lines: LineMap, shared_part: float
-) -> float:
-    """Greatest shape complexity among the polylines of the shared part (V2) [rad²]."""
-    counts = np.bincount(other.segment, minlength=len(lines.segments))
-    hits = np.bincount(other.segment[coincides], minlength=len(lines.segments))
-    shared = hits >= shared_part * np.maximum(counts, 1)
-    parts = [
-        lines.segments[shared & (lines.polyline == name)]
-        for name in np.unique(lines.polyline[shared])
-    ]
-    return max((complexity(part) for part in parts), default=0.0)

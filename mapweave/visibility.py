@@ -35,7 +35,8 @@ def seen_through(
     beam = nearest_beam(scan, bearing)
     inside = (bearing >= scan.angles[0]) & (bearing <= scan.angles[-1])
     before: BoolArray = np.hypot(points[:, 0], points[:, 1]) < clear[beam] - margin
-    return inside & before
+    through: BoolArray = inside & before
+    return through
 
 
 def nearest_beam(scan: Scan, bearing: FloatArray) -> IntArray:
