@@ -1,6 +1,7 @@
 """``mapweave team``: a whole team on this machine, from scans to the joint map."""
 
 import argparse
+import signal
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -71,6 +72,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the team; write and tell what it came to."""
     check_source(options)
     check_id("team", options.team)
+    # Whoever terminates a team means all of it, as with Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     console = Console()
     folder = Folder(options.output)
     folder.create()

@@ -6,13 +6,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 from mapweave.errors import MapweaveError
 
-GRACE = 5.0  # [s] to stop of one's own accord
+GRACE = 20.0  # [s] to stop; the coordinator publishes its last version then
 TOLD_LINES = 3  # of a dead process's log
 
 
@@ -47,10 +48,15 @@ class Child:
     process: subprocess.Popen[bytes]
     log: Path
 
-    def signal_group(self, number: signal.Signals) -> None:
-        """Send a signal to it and to what it may have started."""
-        if self.process.poll() is None:
-            os.killpg(self.process.pid, number)
+    def terminate(self) -> None:
+        """Ask it to stop; what it has started is its own business."""
+        self.process.terminate()
+
+    def kill(self) -> None:
+        """Kill it and what it has started, also where it is gone itself already."""
+        with suppress(ProcessLookupError):  # nobody is left
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
 
 
 class Crew:
@@ -94,30 +100,21 @@ class Crew:
                 raise ChildDiedError(child.name, status, child.log)
 
     def stop(self, lowest_stage: int = 0) -> None:
-        """Stop all processes, the highest stage first; interrupted, kill them all."""
-        try:
-            for stage in sorted({child.stage for child in self.children}, reverse=True):
-                if stage >= lowest_stage:
-                    self._stop_stage([c for c in self.children if c.stage == stage])
-        finally:
-            if lowest_stage == 0 or sys.exception() is not None:
-                self._kill()
+        """Stop the processes from `lowest_stage` up, the highest stage first."""
+        for stage in sorted({child.stage for child in self.children}, reverse=True):
+            if stage >= lowest_stage:
+                self._stop_stage([c for c in self.children if c.stage == stage])
         self.children = [child for child in self.children if child.stage < lowest_stage]
 
     def _stop_stage(self, children: list[Child]) -> None:
         for child in children:
-            child.signal_group(signal.SIGTERM)
+            child.terminate()
         deadline = time.monotonic() + GRACE
         for child in children:
             try:
                 child.process.wait(max(0.0, deadline - time.monotonic()))
             except subprocess.TimeoutExpired:
-                child.signal_group(signal.SIGKILL)
-
-    def _kill(self) -> None:
-        for child in self.children:
-            child.signal_group(signal.SIGKILL)
-            child.process.wait()
+                child.kill()
 
     def __enter__(self) -> "Crew":
         return self
@@ -128,10 +125,16 @@ class Crew:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.stop()
+        children = list(self.children)
+        try:
+            self.stop()
+        finally:
+            # What is left of them, and all of them on a second Ctrl-C.
+            for child in children:
+                child.kill()
 
 
 def last_lines(path: Path, count: int) -> list[str]:
-    """Return the last `count` lines of a text file that are not blank."""
+    """Return the last `count` lines of a text file that say something."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    return [line.strip() for line in lines if line.strip()][-count:]
+    return [line.strip() for line in lines if line.strip(" ^~")][-count:]

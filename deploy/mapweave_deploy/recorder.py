@@ -9,7 +9,7 @@ from mapweave_protocol.keys import ALIGNMENT, MAP, STATUS
 from mapweave_protocol.messages import StatusMessage
 from mapweave_protocol.watch import Watcher
 
-KINDS = {"map": MAP, "alignments": ALIGNMENT, "status": STATUS}
+KINDS = {"map": MAP, "alignment": ALIGNMENT, "status": STATUS}
 
 
 @dataclass

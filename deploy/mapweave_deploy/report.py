@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapweave.maps import Alignment, JointComponent
+from mapweave.maps import Alignment, JointComponent, RobotMap
 from mapweave_deploy.launcher import Outcome
 from mapweave_deploy.occupancy import grid_bytes
 from mapweave_deploy.roster import Member
@@ -89,7 +89,7 @@ def _tell_verdicts(verdicts: Sequence[Verdict], limits: Limits, truth: str) -> I
 def _tell_error(verdict: Verdict) -> str:
     if np.isinf(verdict.distance):
         return "WRONG: they are in different places"
-    error = f"off by {verdict.distance:.2f} m and {np.degrees(verdict.angle):.1f}°"
+    error = f"off by {verdict.distance:.3f} m and {np.degrees(verdict.angle):.1f}°"
     return f"right, {error}" if verdict.right else f"WRONG, {error}"
 
 
@@ -98,15 +98,21 @@ def _tell_traffic(outcome: Outcome, members: Sequence[Member]) -> Iterator[str]:
     for member in members:
         counts = outcome.recorder.sent(member.robot)
         total = sum(count.size for count in counts.values())
-        kinds = ", ".join(f"{kind} {_size(count.size)}" for kind, count in counts.items())
-        yield f"  {member.robot}: {_size(total)} ({kinds}){_tell_grid(outcome, member)}"
+        kinds = ", ".join(
+            f"{_size(count.size)} in {count.messages} {kind} messages"
+            for kind, count in counts.items()
+        )
+        yield f"  {member.robot}: {_size(total)}: {kinds}"
+        if member.robot in outcome.maps:
+            yield f"      {_tell_grid(outcome.maps[member.robot], member)}"
 
 
-def _tell_grid(outcome: Outcome, member: Member) -> str:
-    if member.robot not in outcome.maps:
-        return ""
-    plain, deflated = grid_bytes(member, outcome.maps[member.robot])
-    return f"; once as an occupancy grid of 5 cm: {_size(plain)}, deflated {_size(deflated)}"
+def _tell_grid(robot_map: RobotMap, member: Member) -> str:
+    plain, deflated = grid_bytes(member, robot_map)
+    return (
+        f"the same scans as an occupancy grid of 5 cm, once: {_size(plain)},"
+        f" deflated {_size(deflated)}"
+    )
 
 
 def _size(count: int) -> str:

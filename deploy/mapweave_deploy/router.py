@@ -2,16 +2,18 @@
 
 import argparse
 import re
-import signal
 import sys
+import time
 
 import zenoh
 from mapweave_protocol.session import router_config
+from mapweave_protocol.stopping import stop_on_signal
 
 from mapweave.cli import Command
 from mapweave.errors import MapweaveError
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
+NAP = 0.2  # [s]
 
 
 class ListenError(MapweaveError):
@@ -35,12 +37,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Route until interrupted or terminated."""
     endpoints: list[str] = options.listen or [DEFAULT_LISTEN]
-    # Blocked before Zenoh starts its threads, so that none of them is picked to take it.
-    signals = {signal.SIGINT, signal.SIGTERM}
-    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    stopping = stop_on_signal()
     with _open(endpoints):
         print(f"router: listening at {', '.join(endpoints)}", file=sys.stderr)  # noqa: T201
-        signal.sigwait(signals)
+        while not stopping():
+            # In short naps: a signal that another thread takes does not wake this one.
+            time.sleep(NAP)
     return 0
 
 

@@ -1,5 +1,7 @@
 """The built-in worlds and the tours through them."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import shapely
@@ -12,6 +14,7 @@ from mapweave_deploy.world import World
 WORLDS = pytest.mark.parametrize("name", ["office", "arena"])
 
 
+@cache
 def place_and_tours(name: str, seed: int = 5, robots: int = 3) -> tuple[World, list[Tour]]:
     """Return a world and a team's tours through it."""
     world = BUILDERS[name](seed)
@@ -59,7 +62,7 @@ def test_robots_keep_to_their_speed_and_turn_rate(name: str) -> None:
 
 
 @WORLDS
-@pytest.mark.parametrize("robots", [2, 3, 6])
+@pytest.mark.parametrize("robots", [3, pytest.param(6, marks=pytest.mark.slow)])
 def test_every_pair_of_tours_sees_15_m_of_the_same_wall(name: str, robots: int) -> None:
     world, tours = place_and_tours(name, robots=robots)
     centres = make_grid(world, TOURS[name].radius).centres

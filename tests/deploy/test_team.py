@@ -1,0 +1,111 @@
+"""``mapweave team`` from scans to the joint map, with real processes."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from mapweave_fusion_server.store import Store
+from mapweave_protocol.codec import decode
+from mapweave_protocol.messages import JointMapMessage
+
+from mapweave.files import read_joint
+
+PROGRAM = [sys.executable, "-c", "import sys; from mapweave.cli import main; sys.exit(main())"]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A team that has run to its end."""
+
+    folder: Path
+    said: str
+
+
+def run_team(folder: Path, *arguments: str) -> Run:
+    """Run a team to its end."""
+    done = subprocess.run(
+        [*PROGRAM, "team", *arguments, "--output", str(folder), "--timeout", "300"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return Run(folder, done.stdout)
+
+
+@pytest.fixture(scope="module")
+def arena(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Return what two robots in the arena came to."""
+    return run_team(tmp_path_factory.mktemp("arena"), "--world", "arena", "--robots", "2")
+
+
+def test_the_robots_end_in_one_component_rightly(arena: Run) -> None:
+    joint = read_joint(arena.folder / "joint.json")
+    assert [sorted(component.robots) for component in joint.components] == [["r1/0", "r2/0"]]
+    assert "Right within 0.3 m and 3° of the simulated truth: 1 of 1" in arena.said
+
+
+def test_words_say_who_joined_whom_with_which_confidence(arena: Run) -> None:
+    assert re.search(r"r1/0 and r2/0, confidence [01]\.\d\d: \d+ m of wall in common", arena.said)
+
+
+def test_words_name_the_files_which_are_there(arena: Run) -> None:
+    for name in ("joint.png", "joint.json", "store.sqlite"):
+        assert str(arena.folder / name) in arena.said
+        assert (arena.folder / name).stat().st_size > 0
+
+
+def test_words_count_what_each_robot_sent_and_its_scans_as_a_grid(arena: Run) -> None:
+    for robot in ("r1", "r2"):
+        assert re.search(
+            rf"  {robot}: [\d.]+ kB: [\d.]+ kB in \d+ map messages,.*\n"
+            r" +the same scans as an occupancy grid of 5 cm, once: [\d.]+ kB, deflated",
+            arena.said,
+        )
+
+
+def test_the_joint_map_written_is_the_last_version_of_the_store(arena: Run) -> None:
+    written = json.loads((arena.folder / "joint.json").read_text())
+    with Store(arena.folder / "store.sqlite", "team") as store:
+        messages = list(store.versions_since(0))
+        last = decode(JointMapMessage, messages[-1])
+    assert last.version == written["version"] == len(messages)
+    assert len(last.components) == len(written["components"])
+
+
+def test_versions_were_told_as_they_came_without_a_gap(arena: Run) -> None:
+    told = [int(number) for number in re.findall(r"^joint map (\d+):", arena.said, re.MULTILINE)]
+    assert told[0] == 1
+    assert all(later == earlier + 1 for earlier, later in pairwise(told))
+
+
+@pytest.mark.slow
+def test_three_robots_in_the_office_end_in_one_component_rightly(tmp_path: Path) -> None:
+    said = run_team(tmp_path, "--world", "office").said
+    assert "3 of 3 joined pairs" in said
+    assert "WRONG" not in said
+
+
+@pytest.mark.slow
+def test_a_real_log_in_three_stretches_is_joined_and_not_wrongly(
+    tmp_path: Path, data_dir: Path
+) -> None:
+    run = run_team(tmp_path, str(data_dir / "fr079.log.gz"))
+    joint = read_joint(run.folder / "joint.json")
+    assert max(len(component.robots) for component in joint.components) >= 2
+    assert "WRONG" not in run.said
+
+
+@pytest.mark.slow
+def test_robots_in_two_buildings_are_not_joined_across(tmp_path: Path, data_dir: Path) -> None:
+    logs = [str(data_dir / name) for name in ("seattle.log.gz", "intel.log.gz")]
+    run = run_team(tmp_path, *logs, "--robots", "2")
+    first, second = {"r1", "r2"}, {"r3", "r4"}
+    for component in read_joint(run.folder / "joint.json").components:
+        robots = {name.partition("/")[0] for name in component.robots}
+        assert robots <= first or robots <= second

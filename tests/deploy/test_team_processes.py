@@ -1,0 +1,141 @@
+"""``mapweave team`` as a process: whatever ends it, it leaves no process behind."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+PROGRAM = [sys.executable, "-c", "import sys; from mapweave.cli import main; sys.exit(main())"]
+DEADLINE = 60.0  # [s], for a machine with much else to do
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs Linux's /proc")
+
+
+@contextmanager
+def running_team(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", set[int]]]:
+    """Run a team of two in real time, which takes minutes; give it and its process groups."""
+    command = [*PROGRAM, "team", "--world", "arena", "--robots", "2", "--rate", "1"]
+    with subprocess.Popen(
+        [*command, "--output", str(folder)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        text=True,
+    ) as team:  # fmt: skip
+        try:
+            until(lambda: len(_mapping(folder)) == 2)
+            yield team, {pid for pid, (parent, _) in _processes().items() if parent == team.pid}
+        finally:
+            team.kill()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for a condition; fail when it does not come about."""
+    deadline = time.monotonic() + DEADLINE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _mapping(folder: Path) -> list[Path]:
+    """Return the logs of the agents that have joined their team."""
+    return [log for log in folder.glob("processes/agent-*.log") if "joins" in log.read_text()]
+
+
+def _processes() -> dict[int, tuple[int, int]]:
+    """Return of every process that runs its parent and its group."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, parent, group = (folder / "stat").read_text().rpartition(")")[2].split()[:3]
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if state != "Z":
+            found[int(folder.name)] = int(parent), int(group)
+    return found
+
+
+def _nothing_left(groups: set[int]) -> bool:
+    return not any(group in groups for _, group in _processes().values())
+
+
+def _agent(robot: str, groups: set[int]) -> int:
+    """Return the process of a robot."""
+    [agent] = [
+        pid for pid in groups if f"--robot\0{robot}\0" in Path(f"/proc/{pid}/cmdline").read_text()
+    ]
+    return agent
+
+
+def test_a_killed_agent_ends_the_team_with_one_line_that_names_it(tmp_path: Path) -> None:
+    with running_team(tmp_path) as (team, groups):
+        assert len(groups) == 4  # router, coordinator, two agents
+        os.kill(_agent("r2", groups), signal.SIGKILL)
+        assert team.wait(DEADLINE) == 1
+        assert team.stderr is not None
+        assert re.fullmatch(r"mapweave: agent r2 was killed by SIGKILL.*\n", team.stderr.read())
+    until(lambda: _nothing_left(groups))
+
+
+@pytest.mark.parametrize(
+    "how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+)
+def test_interrupted_a_team_stops_all_processes_and_leaves_earlier_results(
+    tmp_path: Path, how: signal.Signals
+) -> None:
+    results = [tmp_path / name for name in ("joint.json", "joint.png", "store.sqlite")]
+    for result in results:
+        result.write_text("earlier")
+    with running_team(tmp_path) as (team, groups):
+        team.send_signal(how)
+        assert team.wait(DEADLINE) == 130
+        assert team.stderr is not None
+        assert team.stderr.read() == "mapweave: interrupted\n"
+        assert _nothing_left(groups)
+    assert [result.read_text() for result in results] == ["earlier"] * 3
+
+
+@pytest.mark.slow
+def test_a_killed_launcher_takes_all_processes_with_it(tmp_path: Path) -> None:
+    with running_team(tmp_path) as (team, groups):
+        team.kill()
+    until(lambda: _nothing_left(groups))
+
+
+def test_a_team_out_of_time_says_who_is_not_done(tmp_path: Path) -> None:
+    command = [*PROGRAM, "team", "--world", "arena", "--robots", "2", "--rate", "1"]
+    told = subprocess.run(
+        [*command, "--timeout", "1", "--output", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.returncode == 1
+    expected = "mapweave: the team was not done within 1 s, still to come: r1, r2\n"
+    assert told.stderr == expected
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "expected"),
+    [
+        (["missing.log"], 1, r"mapweave: missing.log: no such file; expected .*\n"),
+        (["--world", "office", "some.log"], 2, r"(?s).*expected either logs or --world\n"),
+        ([], 2, r"(?s).*expected either logs or --world\n"),
+        (["--world", "moon"], 2, r"(?s).*invalid choice: 'moon'.*\n"),
+        (["--world", "arena", "--robots", "0"], 2, r"(?s).*expected 1 or more\n"),
+        (["--world", "arena", "--team", "A/B"], 1, r"mapweave: team 'A/B': expected .*\n"),
+        (["--world", "arena", "--rate", "fast"], 2, r"(?s).*--rate.*'fast'.*\n"),
+    ],
+)
+def test_wrong_arguments_are_told_before_anything_starts(
+    tmp_path: Path, arguments: list[str], status: int, expected: str
+) -> None:
+    told = subprocess.run(
+        [*PROGRAM, "team", *arguments], capture_output=True, text=True, cwd=tmp_path, check=False
+    )
+    assert told.returncode == status
+    assert re.fullmatch(expected, told.stderr)

@@ -1,0 +1,89 @@
+"""Joined rightly or not: against truths that are known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mapweave_deploy.roster import Member
+from mapweave_deploy.verdict import Limits, Verdict, fit, judge
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
+
+LIMITS = Limits(0.3, np.radians(3.0))
+
+
+def drive(rng: np.random.Generator) -> FloatArray:
+    """Return (50, 3) poses of a random path [m, m, rad]."""
+    steps = np.column_stack([rng.normal(0, 0.3, (50, 2)), rng.normal(0, 0.2, 50)])
+    return np.cumsum(steps, axis=0)
+
+
+def team(
+    rng: np.random.Generator, error: FloatArray, places: tuple[str, str] = ("x", "x")
+) -> list[Verdict]:
+    """Judge robots a and b, joined with `error` (3,) in the frame of b."""
+    frames = {"a": rng.normal(0, 3, 3), "b": rng.normal(0, 3, 3)}  # in the world
+    paths = {robot: drive(rng) for robot in frames}
+    world_to_joint = rng.normal(0, 3, 3)
+    robots = {f"{robot}/0": se2.compose(world_to_joint, frame) for robot, frame in frames.items()}
+    robots["b/0"] = se2.compose(robots["b/0"], error)
+    component = JointComponent(robots, 1.0, LineMap.empty(), np.empty(0))
+    index = np.arange(50)
+    members = [
+        Member(r, Path("log"), (0, 50), place, index, se2.compose(frames[r], paths[r]))
+        for r, place in zip("ab", places, strict=True)
+    ]
+    maps = {robot: robot_map(robot, path, rng) for robot, path in paths.items()}
+    return list(judge(JointMap(1, (component,), ()), maps, members, LIMITS))
+
+
+def robot_map(robot: str, path: FloatArray, rng: np.random.Generator) -> RobotMap:
+    """Return a robot map of two submaps along `path`."""
+    submaps = []
+    for number, part in enumerate(np.split(np.arange(50), 2)):
+        frame = rng.normal(0, 3, 3)
+        trajectory = Trajectory(part, np.zeros(25), se2.between(frame, path[part]))
+        submaps.append(Submap(number, 0, frame, LineMap.empty(), trajectory))
+    return RobotMap(robot, "boot", 1, tuple(submaps))
+
+
+def test_a_fit_finds_the_motion_between_two_paths() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        motion, poses = rng.normal(0, 2, 3), drive(rng)
+        found = fit(poses, se2.compose(motion, poses))
+        np.testing.assert_allclose(se2.between(motion, found), 0.0, atol=1e-9)
+
+
+def test_a_fit_on_one_spot_uses_the_headings() -> None:
+    poses = np.array([[1.0, 2.0, 0.1]])
+    motion = np.array([3.0, -1.0, 2.0])
+    np.testing.assert_allclose(fit(poses, se2.compose(motion, poses)), motion, atol=1e-9)
+
+
+def test_robots_joined_as_in_truth_are_right_wherever_the_frames_are() -> None:
+    for seed in range(10):
+        [verdict] = team(np.random.default_rng(seed), np.zeros(3))
+        assert verdict.right
+        assert verdict.distance < 1e-9
+        assert verdict.angle < 1e-9
+
+
+def test_the_error_of_a_wrong_place_is_its_shift() -> None:
+    [verdict] = team(np.random.default_rng(2), np.array([0.3, 0.4, 0.0]))
+    assert not verdict.right
+    assert verdict.distance == pytest.approx(0.5)
+    assert verdict.angle == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_error_of_a_wrong_turn_is_its_angle() -> None:
+    [verdict] = team(np.random.default_rng(3), np.array([0.0, 0.0, -0.06]))
+    assert verdict.angle == pytest.approx(0.06)
+    assert not verdict.right
+
+
+def test_robots_in_different_places_cannot_be_joined_rightly() -> None:
+    [verdict] = team(np.random.default_rng(4), np.zeros(3), ("x", "y"))
+    assert not verdict.right
