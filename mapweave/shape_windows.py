@@ -57,7 +57,11 @@ class WindowParameters(BaseModel):
         0.5, gt=0, description="[m] rms beyond which points are of different places"
     )
     min_gain: float = Field(
-        0.0, ge=-1, le=1, description="least similarity beyond that of either to a straight line"
+        -0.1,
+        ge=-1,
+        le=1,
+        description="least similarity beyond that of either window to a straight line; below 0 for"
+        " the true pairs that noise and phase make a little less alike",
     )
     residual_scale: float = Field(
         3.0, gt=0, description="[m] rms that would outweigh a similarity of 1 in the score"
@@ -198,9 +202,9 @@ def all_windows(
 def match(a: Windows, b: Windows, parameters: WindowParameters) -> Candidates:
     """Return the pairs of salient, similar windows of one arc length, best first (H1, H2).
 
-    A pair that is less alike than one of its windows is to a straight line explains nothing and
-    is left out. Of neighbouring pairs, one stride away on one or both polylines, only the best
-    stays: they stand for one alignment.
+    A pair clearly less alike than one of its windows is to a straight line explains nothing and
+    is left out. Of neighbouring pairs, one stride away on one or both polylines, only the one
+    that explains most stays: they stand for one alignment.
 
     Parameters
     ----------
@@ -271,7 +275,7 @@ def _places(windows: Windows, chosen: IntArray) -> IntArray:
 
 
 def _peaks(gain: FloatArray, row: IntArray, column: IntArray) -> IntArray:
-    """Return which pairs gain anything and are beaten by no neighbour; of equals the first stays.
+    """Return which pairs no neighbouring pair beats; of equal neighbours the first stays.
 
     Neighbours, one stride away on one or both polylines, stand for the same alignment. Gains are
     rounded, so that which of equals is the first does not hang on the maps' frames.
@@ -279,7 +283,7 @@ def _peaks(gain: FloatArray, row: IntArray, column: IntArray) -> IntArray:
     Parameters
     ----------
     gain
-        (p,) of each pair.
+        (p,) of each pair; -inf where it is out of the question.
     row, column
         (p,) places of its windows, as of `_places`, ascending.
     """
