@@ -214,7 +214,7 @@ def match(a: Windows, b: Windows, parameters: WindowParameters) -> Candidates:
         What is salient, similar and close enough, and how many to return.
     """
     rows, columns = _salient(a, parameters), _salient(b, parameters)
-    product = a.codes[rows] @ b.codes[columns].conj().T / a.codes.shape[1]
+    product = a.codes[rows] / a.codes.shape[1] @ b.codes[columns].conj().T
     row, column = np.nonzero(product.real**2 + product.imag**2 >= parameters.min_similarity**2)
     product = product[row, column]
     similarity = np.minimum(np.abs(product), 1)
