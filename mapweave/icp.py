@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from scipy.spatial import KDTree
 
 from mapweave import se2
-from mapweave.arrays import FloatArray, IntArray
+from mapweave.arrays import BoolArray, FloatArray, IntArray
 from mapweave.surface import Surface
 
 
@@ -87,6 +87,7 @@ def align(
     start: FloatArray,
     parameters: IcpParameters,
     prior: FloatArray | None = None,
+    corresponding: BoolArray | None = None,
 ) -> Fit:
     """Move `moving` from `start` (3,) until it lies on `target`.
 
@@ -95,13 +96,16 @@ def align(
     prior
         (3, 3) information [1/m², 1/rad²] that holds the pose at `start`; decides the directions
         that the surfaces leave open.
+    corresponding
+        (target's polylines, moving one's polylines) which may be partners; all points may where
+        it is not given, and points on no polyline have no part where it is.
     """
     pose = np.array(start, dtype=float)
     held = np.zeros((3, 3)) if prior is None else prior
     scale = parameters.start_scale
     information = np.zeros((3, 3))
     for _ in range(parameters.max_iterations):
-        normal_matrix, gradient = _linearise(moving, target, pose, scale, parameters)
+        normal_matrix, gradient = _linearise(moving, target, pose, scale, parameters, corresponding)
         information = normal_matrix
         system = normal_matrix / parameters.noise**2 + held + np.diag([1e-6, 1e-6, 1e-6])
         error = pose - start
@@ -134,12 +138,21 @@ def _features(surface: Surface, parameters: IcpParameters) -> FloatArray:
 
 
 def _linearise(
-    moving: Surface, target: Target, pose: FloatArray, scale: float, parameters: IcpParameters
+    moving: Surface,
+    target: Target,
+    pose: FloatArray,
+    scale: float,
+    parameters: IcpParameters,
+    corresponding: BoolArray | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Normal matrix (3, 3) and gradient (3,) of the robust point-to-line cost at `pose`."""
     placed = moving.moved(pose)
     distance, index = partners(placed, target, parameters, 3 * scale)
     paired = np.isfinite(distance)
+    if corresponding is not None:
+        paired[paired] = corresponding[
+            target.surface.polyline[index[paired]], moving.polyline[paired]
+        ]
     points, index = placed.points[paired], index[paired]
     normals = target.surface.normals[index]
     residual = np.einsum("ij,ij->i", normals, points - target.surface.points[index])

@@ -13,7 +13,7 @@ from mapweave.map_raster import MapRaster, RasterParameters
 from mapweave.maps import Alignment, JointComponent, JointMap, LineMap
 from mapweave.merging import MergingParameters, evolve
 from mapweave.polylines import group_polylines
-from mapweave.surface import segment_surface
+from mapweave.surface import line_surface
 
 
 class JointParameters(BaseModel):
@@ -74,7 +74,7 @@ def _segment_confidence(lines: LineMap, placed: list[LineMap], p: JointParameter
     """
     if len(lines.segments) == 0:
         return np.empty(0)
-    surface, owner = segment_surface(lines.segments, p.raster.spacing)
+    surface, owner = line_surface(lines, p.raster.spacing)
     denied = np.zeros(len(surface), dtype=np.bool_)
     for one in placed:
         if len(one.segments) == 0:

@@ -12,7 +12,7 @@ from scipy.ndimage import distance_transform_edt
 
 from mapweave.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from mapweave.maps import LineMap
-from mapweave.surface import Surface, segment_surface
+from mapweave.surface import Surface, line_surface
 
 
 class RasterParameters(BaseModel):
@@ -66,7 +66,7 @@ class MapRaster:
     def of(cls, line_map: LineMap, parameters: RasterParameters) -> "MapRaster":
         """Rasterise `line_map`, which has at least one segment."""
         p = parameters
-        surface, segment = segment_surface(line_map.segments, p.spacing)
+        surface, segment = line_surface(line_map, p.spacing)
         lengths = np.hypot(*(line_map.segments[:, 2:] - line_map.segments[:, :2]).T)
         counts = np.bincount(segment, minlength=len(lengths))
         trust = np.minimum(1.0, line_map.support / p.full_support)

@@ -6,17 +6,18 @@ nowhere waits; when several in a row fit nowhere, the robot is lost and starts a
 
 from dataclasses import dataclass
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
-from mapweave.maps import RobotMap, Submap
+from mapweave.assembly import place, unite_lines
+from mapweave.fusion import FusionParameters
+from mapweave.maps import LineMap, RobotMap, Submap
 from mapweave.names import check_id
+from mapweave.observation import Observation, ObservationParameters, observe
+from mapweave.reunion import reunite
 from mapweave.scan import Scan
-from mapweave.segments import ScanSegments, SegmentParameters, extract_segments
 from mapweave.submap import GrowingSubmap, SubmapParameters
-from mapweave.surface import Surface, scan_surface
 from mapweave.tracker import Tracked, Tracker, TrackerParameters
 
 
@@ -25,12 +26,10 @@ class MapperParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    segments: SegmentParameters = SegmentParameters()
+    observation: ObservationParameters = ObservationParameters()
     tracker: TrackerParameters = TrackerParameters()
     submap: SubmapParameters = SubmapParameters()
-    sight: float = Field(
-        14.0, gt=0, description="[m] returns up to here are aligned; farther ones are too sparse"
-    )
+    fusion: FusionParameters = FusionParameters()
     patience: int = Field(
         5, ge=1, description="scans in a row that fit nowhere before the robot counts as lost"
     )
@@ -58,15 +57,6 @@ class Placement:
     lost: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Prepared:
-    """A scan with its segments and oriented points."""
-
-    scan: Scan
-    segments: ScanSegments
-    surface: Surface
-
-
 class Mapper:
     """Maps the scans of one robot."""
 
@@ -81,49 +71,63 @@ class Mapper:
         self._component = 0
         self._tracker = Tracker(self.parameters.tracker)
         self._growing = GrowingSubmap(self.parameters.submap)
-        self._frame: FloatArray = se2.IDENTITY
-        self._waiting: list[_Prepared] = []
+        self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
+        self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
+        self._waiting: list[Observation] = []
 
     def add(self, scan: Scan) -> Placement:
         """Take the next scan."""
-        prepared = self._prepare(scan)
-        if len(prepared.surface) < self.parameters.tracker.min_points:
+        seen = observe(scan, self.parameters.observation)
+        if self._tracker.is_blind(seen):
             return Placement(False, self._component, False, False)  # blind: nothing to place
         finished = len(self._finished)
         lost = False
-        placed = self._place(prepared)
+        placed = self._place(seen)
         if not placed:
-            self._waiting.append(prepared)
+            self._waiting.append(seen)
             if len(self._waiting) >= self.parameters.patience:
                 lost = self._start_again()
                 placed = True
         return Placement(placed, self._component, len(self._finished) > finished, lost)
+
+    def finish(self) -> RobotMap:
+        """Finish the growing submap, as at the end of a log, and return the map."""
+        if not self._growing.is_empty:
+            self._finish_submap()
+        return self.robot_map()
 
     def robot_map(self) -> RobotMap:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap()]
         return RobotMap(self.robot, self.boot, self._version, (*self._finished, *growing))
 
-    def _prepare(self, scan: Scan) -> _Prepared:
-        segments = extract_segments(scan, self.parameters.segments)
-        return _Prepared(scan, segments, scan_surface(scan, segments, self.parameters.sight))
-
-    def _place(self, prepared: _Prepared) -> bool:
-        tracked = self._tracker.place(prepared.scan, prepared.surface)
+    def _place(self, seen: Observation) -> bool:
+        tracked = self._tracker.place(seen, self._known)
         if tracked is None:
             self._tracker.forget_motion()
             return False
-        self._merge(prepared, tracked.pose)
+        self._merge(seen, tracked.pose)
         self._place_waiting()
         return True
+
+    def _known(self) -> LineMap:
+        """G_(t-1): the lines around the robot, tracker's frame."""
+        growing = [] if self._growing.is_empty else [place(self._growing.lines(), self._frame)]
+        to_tracker = se2.inverse(self._origin)
+        last = [
+            place(s.map, se2.compose(to_tracker, s.pose))
+            for s in self._finished[-1:]
+            if s.component == self._component
+        ]
+        return unite_lines(last + growing)
 
     def _place_waiting(self) -> None:
         """Try the scans that wait once more, from the one next to the known pose backwards."""
         pose = self._tracker.pose
-        for prepared in reversed(self._waiting):
-            tracked: Tracked | None = self._tracker.revisit(prepared.scan, prepared.surface, pose)
+        for seen in reversed(self._waiting):
+            tracked: Tracked | None = self._tracker.revisit(seen, pose)
             if tracked is not None:
-                self._merge(prepared, tracked.pose)
+                self._merge(seen, tracked.pose)
                 pose = tracked.pose
         self._waiting.clear()
 
@@ -132,34 +136,38 @@ class Mapper:
         waiting, self._waiting = self._waiting, []
         if not self._growing.is_empty:
             self._finish_submap()
-            self._component += 1
+        self._component = 1 + max((s.component for s in self._finished), default=-1)
         self._tracker = Tracker(self.parameters.tracker)
-        self._growing = GrowingSubmap(self.parameters.submap)
-        self._frame = se2.IDENTITY
-        for prepared in waiting:
-            if not self._place(prepared):
-                self._waiting.append(prepared)
+        self._origin = self._frame = se2.IDENTITY
+        for seen in waiting:
+            if not self._place(seen):
+                self._waiting.append(seen)
         return True
 
-    def _merge(self, prepared: _Prepared, pose: FloatArray) -> None:
+    def _merge(self, seen: Observation, pose: FloatArray) -> None:
         """Merge a scan at `pose`, tracker's frame, into the growing submap."""
         if self._growing.is_full:
             self._finish_submap()
-            self._growing = GrowingSubmap(self.parameters.submap)
         if self._growing.is_empty:
             self._frame = pose
         local = se2.between(self._frame, pose)
-        self._growing.add(prepared.scan, prepared.segments.segments, local)
+        self._growing.add(seen.scan, seen.lines.segments, local)
         self._version += 1
 
     def _finish_submap(self) -> None:
-        self._finished.append(self._submap())
+        """Close the growing submap, and join its component to an older one where shapes allow."""
+        self._finished = list(reunite([*self._finished, self._submap()], self.parameters.fusion))
+        last = self._finished[-1]
+        self._component = last.component
+        self._origin = se2.compose(last.pose, se2.inverse(self._frame))
+        self._growing = GrowingSubmap(self.parameters.submap)
+        self._version += 1
 
     def _submap(self) -> Submap:
         return Submap(
             len(self._finished),
             self._component,
-            np.array(self._frame),
+            se2.compose(self._origin, self._frame),
             self._growing.line_map(),
             self._growing.trajectory(),
         )

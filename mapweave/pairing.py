@@ -27,7 +27,7 @@ class MergingParameters(BaseModel):
         description="stop when no pair is cheaper [m]; two 3 m sightings 5 cm apart cost 0.04",
     )
     max_step: float = Field(
-        default=0.15,
+        default=0.12,
         gt=0,
         description="largest colC [m]: parallel surfaces farther apart stay apart",
     )
@@ -43,8 +43,14 @@ class MergingParameters(BaseModel):
         description="largest difference of directions [rad], visible sides respected; short"
         " segments are this noisy, for long ones the cost decides",
     )
+    turn_noise: float = Field(
+        default=np.deg2rad(1.0),
+        ge=0,
+        description="of scan poses [rad]; what `max_step` grows by with the length of the shorter"
+        " segment: sightings of a long wall fan out",
+    )
     end_noise: float = Field(
-        default=0.1,
+        default=0.05,
         ge=0,
         description="ends this close along the wall [m] are one end, seen through the noise",
     )
@@ -90,11 +96,12 @@ class Pairing:
         limits = self._parameters
         terms = cost_terms(pairs, self.direction(pairs))
         cost = terms.total(limits.balance)
+        shorter = pairs.lengths.min(axis=0)
         possible = (
             ~pairs.turned  # else they show opposite faces
             & (pairs.cosines >= np.cos(limits.max_angle))
             & (cost <= limits.max_cost)
-            & (terms.collinearity <= limits.max_step)
+            & (terms.collinearity <= limits.max_step + limits.turn_noise * shorter)
             & (terms.proximity <= limits.max_gap)
         )
         return np.where(possible, cost, np.inf)

@@ -21,10 +21,10 @@ class SliverParameters(BaseModel):
         default=0.4, gt=0, description="longer segments are no slivers [m]; half a door"
     )
     max_distance: float = Field(
-        default=0.12,
+        default=0.15,
         gt=0,
         description="how far a sliver reaches away from the longer segment at most [m]; laser"
-        " noise and the tolerance of segments, twice",
+        " noise and the tolerance of segments, on both sides of a rough wall",
     )
     max_angle: float = Field(
         default=np.deg2rad(120.0),
@@ -58,8 +58,29 @@ def absorb_slivers(
     lengths = np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
     owner = np.arange(len(segments))
     for number in np.flatnonzero(lengths <= chosen.max_length):
-        longer = np.flatnonzero(_longer(lengths, number))
-        best = _nearest(segments, number, longer, chosen)
-        if best is not None:
-            owner[number] = best
-    return _evolution(segments, weights, _last_owners(owner))
+        longer = np.flatnonzero(lengths > lengths[number])  # so no two own each other
+        distance = _distance(segments[number], segments[longer], chosen.max_angle)
+        if len(longer) and distance.min() <= chosen.max_distance:
+            owner[number] = longer[np.argmin(distance)]
+    while (owner != owner[owner]).any():  # a sliver of a sliver
+        owner = owner[owner]
+    left, labels = np.unique(owner, return_inverse=True)
+    total = np.bincount(labels, weights, minlength=len(left))
+    return Evolution(segments[left], total, labels.astype(np.int64))
+
+
+def _distance(sliver: FloatArray, segments: FloatArray, max_angle: float) -> FloatArray:
+    """Return how far `sliver` (4,) reaches away from each (k, 4) segment [m], as (k,).
+
+    Infinite where their directions differ by more than `max_angle` [rad].
+    """
+    start = segments[:, :2]
+    along = segments[:, 2:] - start
+    squared = (along**2).sum(axis=1)
+    reach = np.zeros(len(segments))
+    for end in (sliver[:2], sliver[2:]):
+        share = np.clip(((end - start) * along).sum(axis=1) / squared, 0.0, 1.0)
+        reach = np.maximum(reach, np.hypot(*(end - start - share[:, None] * along).T))
+    own = sliver[2:] - sliver[:2]
+    cosine = along @ own / (np.sqrt(squared) * max(float(np.hypot(*own)), 1e-12))
+    return np.where(cosine >= np.cos(max_angle), reach, np.inf)

@@ -1,6 +1,6 @@
 """A submap while it grows: G_t from G_(t-1) and S_t (paper, V and VI)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -92,12 +92,16 @@ class GrowingSubmap:
 
     def line_map(self) -> LineMap:
         """Return the lines and the free space seen so far."""
-        order, polyline = group_polylines(self._segments, self._parameters.max_gap)
-        support = count_support(self._sightings.labels, self._sightings.scans)
         if self._cleared:
             self._cleared = [unite(self._cleared, self._parameters.free_space)]
         outlines = rings(self._cleared[0]) if self._cleared else ()
-        return LineMap(self._segments[order], polyline, support[order], outlines)
+        return replace(self.lines(), free_space=outlines)
+
+    def lines(self) -> LineMap:
+        """Return the lines alone."""
+        order, polyline = group_polylines(self._segments, self._parameters.max_gap)
+        support = count_support(self._sightings.labels, self._sightings.scans)
+        return LineMap(self._segments[order], polyline, support[order])
 
     def _merge(self, scan: int, segments: FloatArray) -> None:
         evolution = merge_scan(self._segments, self._weights, segments, self._parameters.merging)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapweave import se2
-from mapweave.arrays import FloatArray, IntArray
+from mapweave.arrays import BoolArray, FloatArray, IntArray
+from mapweave.maps import LineMap
 from mapweave.scan import Scan
 from mapweave.segments import ScanSegments
 
@@ -26,10 +27,13 @@ class Surface:
         (n, 2) [m].
     normals
         (n, 2) unit vectors towards the visible side.
+    polyline
+        (n,) the generalized polyline each point is on; -1 for none.
     """
 
     points: FloatArray
     normals: FloatArray
+    polyline: IntArray
 
     def __len__(self) -> int:
         """Return the number of points."""
@@ -37,19 +41,20 @@ class Surface:
 
     def moved(self, pose: FloatArray) -> "Surface":
         """Return the same surface, given in the frame at `pose` (3,), in that frame's parent."""
-        return Surface(
-            se2.transform_points(pose, self.points), self.normals @ se2.rotation(pose[2]).T
-        )
+        normals: FloatArray = self.normals @ se2.rotation(pose[2]).T
+        return Surface(se2.transform_points(pose, self.points), normals, self.polyline)
 
-    def at(self, index: IntArray | slice) -> "Surface":
+    def at(self, index: IntArray | BoolArray | slice) -> "Surface":
         """Return the points selected by `index`."""
-        return Surface(self.points[index], self.normals[index])
+        return Surface(self.points[index], self.normals[index], self.polyline[index])
 
 
 def join_surfaces(surfaces: list[Surface]) -> Surface:
     """Return all points of `surfaces`, which share a frame."""
     return Surface(
-        np.concatenate([s.points for s in surfaces]), np.concatenate([s.normals for s in surfaces])
+        np.concatenate([s.points for s in surfaces]),
+        np.concatenate([s.normals for s in surfaces]),
+        np.concatenate([s.polyline for s in surfaces]),
     )
 
 
@@ -60,8 +65,12 @@ def left_normals(directions: FloatArray) -> FloatArray:
     return normals
 
 
-def scan_surface(scan: Scan, segments: ScanSegments, max_range: float) -> Surface:
+def scan_surface(
+    scan: Scan, segments: ScanSegments, polyline: IntArray, max_range: float
+) -> Surface:
     """Return the oriented points of `scan` up to `max_range` [m], sensor frame.
+
+    `polyline` (n,) names the generalized polyline of each of the n segments.
 
     A return on a segment takes the segment's normal; another, its neighbours'. Returns without
     a neighbour near enough have no direction and are left out.
@@ -70,21 +79,24 @@ def scan_surface(scan: Scan, segments: ScanSegments, max_range: float) -> Surfac
         used = np.flatnonzero(scan.hits & (scan.ranges <= max_range))
     points = scan.points[used]
     if len(used) < 2:
-        return Surface(np.empty((0, 2)), np.empty((0, 2)))
+        return Surface(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=np.int64))
     directions = _neighbour_directions(points)
     label = segments.label[used]
     on_segment = label >= 0
     lines = segments.segments[label[on_segment]]
     directions[on_segment] = lines[:, 2:] - lines[:, :2]
+    of_polyline = np.full(len(used), -1)
+    of_polyline[on_segment] = polyline[label[on_segment]]
     oriented = np.hypot(*directions.T) > 0
-    return Surface(points[oriented], left_normals(directions[oriented]))
+    return Surface(points[oriented], left_normals(directions[oriented]), of_polyline[oriented])
 
 
-def segment_surface(segments: FloatArray, spacing: float) -> tuple[Surface, IntArray]:
-    """Return oriented points about every `spacing` [m] along (n, 4) directed `segments`.
+def line_surface(lines: LineMap, spacing: float) -> tuple[Surface, IntArray]:
+    """Return oriented points about every `spacing` [m] along the segments of `lines`.
 
     The second value tells which segment each point is on; each has one at least.
     """
+    segments = lines.segments
     directions = segments[:, 2:] - segments[:, :2]
     lengths = np.hypot(directions[:, 0], directions[:, 1])
     counts = np.maximum(1, np.round(lengths / spacing)).astype(np.int64)
@@ -92,7 +104,7 @@ def segment_surface(segments: FloatArray, spacing: float) -> tuple[Surface, IntA
     rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     fraction = (rank + 0.5) / counts[owner]
     points = segments[owner, :2] + fraction[:, None] * directions[owner]
-    return Surface(points, left_normals(directions)[owner]), owner
+    return Surface(points, left_normals(directions)[owner], lines.polyline[owner]), owner
 
 
 def _neighbour_directions(points: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ window is searched; where that does not convince either, the scan is not placed.
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +15,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import BoolArray, FloatArray
+from mapweave.correspondence import CorrespondenceParameters, correspond
 from mapweave.icp import Fit, IcpParameters, Target, align, partners
+from mapweave.maps import LineMap
+from mapweave.observation import Observation
 from mapweave.scan import Scan
 from mapweave.search import NearnessRaster, SearchParameters, search
-from mapweave.surface import Surface, join_surfaces
+from mapweave.surface import Surface, join_surfaces, line_surface
 from mapweave.visibility import seen_through
 
 
@@ -28,6 +32,8 @@ class TrackerParameters(BaseModel):
 
     icp: IcpParameters = IcpParameters()
     search: SearchParameters = SearchParameters()
+    correspondence: CorrespondenceParameters = CorrespondenceParameters()
+    line_spacing: float = Field(0.1, gt=0, description="[m] between points on the map's lines")
     keyframes: int = Field(60, ge=1, description="how many are remembered: some 15-20 m of path")
     keyframe_step: float = Field(0.3, gt=0, description="[m] of motion that makes a new one")
     keyframe_turn: float = Field(0.26, gt=0, description="[rad] of rotation that makes one: 15°")
@@ -40,7 +46,11 @@ class TrackerParameters(BaseModel):
     turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
     surprise: float = Field(0.05, ge=0, description="share of returns that one sigma² is worth")
     convincing: float = Field(0.75, description="score above which no search is made")
-    acceptable: float = Field(0.45, description="score below which a scan is not placed")
+    acceptable: float = Field(0.5, description="score above which a searched pose is taken")
+    plausible: float = Field(0.25, description="score above which one without a rival is taken")
+    margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
+    rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
+    rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
     first_window: float = Field(1.15, gt=0, description="[rad] half the rotation searched first")
     min_points: int = Field(20, ge=3, description="a scan with fewer oriented points is blind")
 
@@ -98,61 +108,98 @@ class Tracker:
         self._target: Target | None = None
         self._raster: NearnessRaster | None = None
 
-    def place(self, scan: Scan, surface: Surface) -> Tracked | None:
-        """Find the pose of `scan` with its oriented points `surface`; None where nothing fits."""
-        if len(surface) < self.parameters.min_points:
+    def place(self, seen: Observation, known: Callable[[], LineMap]) -> Tracked | None:
+        """Find the pose of a scan; None where it fits nowhere.
+
+        Parameters
+        ----------
+        seen
+            The scan, prepared.
+        known
+            Makes the map so far, G_(t-1), tracking frame; asked only where motion alone does not
+            explain the scan.
+        """
+        if self.is_blind(seen):
             return None
-        tracked = self._locate(scan, surface) if self._keyframes else _first()
+        tracked = self._locate(seen, known) if self._keyframes else _first()
         if tracked is None:
             return None
         self._motion = se2.between(self.pose, tracked.pose) if self._keyframes else se2.IDENTITY
         self.pose = tracked.pose
         if self._is_news(tracked.pose):
-            self._remember(Keyframe(scan, tracked.pose, surface.moved(tracked.pose)))
+            self._remember(Keyframe(seen.scan, tracked.pose, seen.surface.moved(tracked.pose)))
         return tracked
 
-    def revisit(self, scan: Scan, surface: Surface, near: FloatArray) -> Tracked | None:
+    def is_blind(self, seen: Observation) -> bool:
+        """Whether a scan shows too little to be placed anywhere."""
+        return len(seen.surface) < self.parameters.min_points
+
+    def revisit(self, seen: Observation, near: FloatArray) -> Tracked | None:
         """Find the pose of an older scan about `near` (3,), leaving the track as it is."""
         p = self.parameters
-        starts = search(surface.points, self._nearness(near), near, np.pi, p.search)
-        best = max(
-            (self._aligned(scan, surface, s) for s in np.vstack([near, starts])),
-            key=lambda tracked: tracked.evidence.score,
-        )
+        starts = search(seen.surface.points, self._nearness(near), near, np.pi, p.search)
+        found = [self._aligned(seen, start) for start in np.vstack([near, starts])]
+        best = max(found, key=lambda tracked: self._value(tracked, near))
         return best if best.evidence.score >= p.acceptable else None
 
     def forget_motion(self) -> None:
         """Expect the next scan where the last was: what moved in between is unknown."""
         self._motion = se2.IDENTITY
 
-    def _locate(self, scan: Scan, surface: Surface) -> Tracked | None:
+    def _locate(self, seen: Observation, known: Callable[[], LineMap]) -> Tracked | None:
+        """Try what is likely first, then what shapes propose, then everything within reach."""
         p = self.parameters
         predicted = se2.compose(self.pose, self._motion)
-        best = self._best(scan, surface, np.stack([predicted, self.pose]))
-        for window in (p.first_window, np.pi):
-            threshold = p.convincing if window < np.pi else p.acceptable
-            if best.evidence.score >= threshold:
-                break
-            raster = self._nearness(predicted)
-            found = search(surface.points, raster, predicted, window, p.search)
-            best = max(
-                best, self._best(scan, surface, found), key=lambda t: self._value(t, predicted)
-            )
-        return best if best.evidence.score >= p.acceptable else None
+        points = seen.surface.points
+        stages: list[tuple[float, Callable[[], FloatArray]]] = [
+            (p.convincing, lambda: np.stack([predicted, self.pose])),
+            (p.convincing, lambda: self._shape_starts(seen, known())),
+            (p.convincing, lambda: self._window(points, predicted, p.first_window)),
+            (p.acceptable, lambda: self._window(points, predicted, np.pi)),
+        ]
+        found: list[Tracked] = []
+        for enough, starts in stages:
+            found += [self._aligned(seen, start) for start in starts()]
+            best = max(found, key=lambda tracked: self._value(tracked, predicted))
+            if best.evidence.score >= enough:
+                return best
+        return best if self._stands_out(best, found) else None
 
-    def _best(self, scan: Scan, surface: Surface, starts: FloatArray) -> Tracked:
-        """Align from each start (k, 3) and return what convinces most."""
-        predicted = se2.compose(self.pose, self._motion)
-        found = [self._aligned(scan, surface, start) for start in starts]
-        return max(found, key=lambda tracked: self._value(tracked, predicted))
-
-    def _aligned(self, scan: Scan, surface: Surface, start: FloatArray) -> Tracked:
+    def _stands_out(self, best: Tracked, found: list[Tracked]) -> bool:
+        """Whether a weak pose, as at the edge of the known, has at least no rival."""
         p = self.parameters
+        apart = se2.between(best.pose, np.stack([tracked.pose for tracked in found]))
+        different = (np.hypot(*apart[:, :2].T) > p.rival_distance) | (
+            np.abs(apart[:, 2]) > p.rival_turn
+        )
+        rivals = [t.evidence.score for t, other in zip(found, different, strict=True) if other]
+        margin = best.evidence.score - max(rivals, default=-1.0)
+        return best.evidence.score >= p.plausible and margin >= p.margin
+
+    def _window(self, points: FloatArray, centre: FloatArray, turn: float) -> FloatArray:
+        return search(points, self._nearness(centre), centre, turn, self.parameters.search)
+
+    def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
+        """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
+        p = self.parameters
+        surface, _ = line_surface(known, p.line_spacing)
+        starts = []
+        for found in correspond(known, seen.lines, p.correspondence):
+            partners_of = np.flatnonzero(found.corresponding.any(axis=1))
+            target = Target.of(surface.at(np.isin(surface.polyline, partners_of)), p.icp)
+            moving = seen.surface.at(seen.surface.polyline >= 0)
+            fit = align(moving, target, found.transform, p.icp, None, found.corresponding)
+            starts.append(fit.pose)
+        return np.array(starts).reshape(-1, 3)
+
+    def _aligned(self, seen: Observation, start: FloatArray) -> Tracked:
+        p = self.parameters
+        surface = seen.surface
         stride = 1 + (len(surface) - 1) // p.max_points
         prior = np.diag([p.motion_sigma**-2, p.motion_sigma**-2, p.turn_sigma**-2])
         assert self._target is not None
         fit: Fit = align(surface.at(slice(None, None, stride)), self._target, start, p.icp, prior)
-        return Tracked(fit.pose, self._evidence(scan, surface, fit.pose), fit.information)
+        return Tracked(fit.pose, self._evidence(seen.scan, surface, fit.pose), fit.information)
 
     def _value(self, tracked: Tracked, predicted: FloatArray) -> float:
         """Evidence less surprise: corridors leave a direction open, and speed is bounded."""

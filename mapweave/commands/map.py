@@ -70,7 +70,7 @@ def _map_log(log: Path, robot: str, chosen: slice) -> tuple[RobotMap, int]:
     for scan in track(_chosen_scans(log, chosen), f"mapping {log.name}", total):
         mapper.add(scan)
         taken += 1
-    robot_map = mapper.robot_map()
+    robot_map = mapper.finish()
     if not robot_map.submaps:
         raise FileError(
             log,

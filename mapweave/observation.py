@@ -1,0 +1,55 @@
+"""A scan, prepared: its lines, grouped into generalized polylines, and its oriented points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.maps import LineMap
+from mapweave.polylines import group_polylines
+from mapweave.scan import Scan
+from mapweave.segments import ScanSegments, SegmentParameters, extract_segments
+from mapweave.surface import Surface, scan_surface
+
+
+class ObservationParameters(BaseModel):
+    """What is used of a scan."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    segments: SegmentParameters = SegmentParameters()
+    max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
+    sight: float = Field(
+        14.0, gt=0, description="[m] returns up to here are aligned; farther ones are too sparse"
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """A scan with what was made of it, all in the sensor's frame.
+
+    Attributes
+    ----------
+    scan
+        The scan itself.
+    lines
+        Its segments as generalized polylines (paper, V).
+    surface
+        Its oriented points, each knowing its polyline.
+    """
+
+    scan: Scan
+    lines: LineMap
+    surface: Surface
+
+
+def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
+    """Approximate `scan` with segments and group them (paper, V, the first two steps)."""
+    found = extract_segments(scan, parameters.segments)
+    order, polyline = group_polylines(found.segments, parameters.max_gap)
+    rank = np.argsort(order)
+    label = np.where(found.label >= 0, rank[found.label] if len(rank) else -1, -1)
+    ordered = ScanSegments(found.segments[order], label)
+    support = np.ones(len(order), dtype=np.int64)
+    lines = LineMap(ordered.segments, polyline, support)
+    return Observation(scan, lines, scan_surface(scan, ordered, polyline, parameters.sight))
