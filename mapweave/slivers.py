@@ -65,7 +65,7 @@ def absorb_slivers(
     while (owner != owner[owner]).any():  # a sliver of a sliver
         owner = owner[owner]
     left, labels = np.unique(owner, return_inverse=True)
-    total = np.bincount(labels, weights, minlength=len(left))
+    total = np.bincount(labels, weights, minlength=len(left)).astype(np.float64)
     return Evolution(segments[left], total, labels.astype(np.int64))
 
 
