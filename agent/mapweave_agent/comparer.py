@@ -73,6 +73,13 @@ class Comparer:
         self._pipe.close()
 
     @property
+    def pid(self) -> int:
+        """Of the process that compares."""
+        pid = self._process.pid
+        assert pid is not None  # it was started
+        return pid
+
+    @property
     def busy(self) -> bool:
         """Whether a comparison was started and its outcome not yet taken."""
         return self._comparison is not None
@@ -83,7 +90,7 @@ class Comparer:
         self._started = time.monotonic()
         try:
             self._pipe.send((comparison.reference, comparison.other))
-        except BrokenPipeError:
+        except (BrokenPipeError, ConnectionResetError):
             # The process died while it waited; `take` starts another and reports it.
             return
 

@@ -29,6 +29,8 @@ class _Peer:
         Its newest map.
     boots
         The runs of it that are alive.
+    gone
+        Whether there were some, and are no longer; its map may be here before its token.
     last
         Boot and version of the map it said to be its last.
     compared, published
@@ -39,6 +41,7 @@ class _Peer:
 
     newest: RobotMap | None = None
     boots: set[str] = field(default_factory=set)
+    gone: bool = False
     last: tuple[str, int] | None = None
     compared: Compared | None = None
     published: Compared | None = None
@@ -90,11 +93,15 @@ class ComparisonPlan:
 
     def peer_here(self, robot: str, boot: str) -> None:
         """Note that a run of a peer is alive."""
-        self._peer(robot).boots.add(boot)
+        peer = self._peer(robot)
+        peer.boots.add(boot)
+        peer.gone = False
 
     def peer_gone(self, robot: str, boot: str) -> None:
         """Note that a run of a peer is no longer alive: its duties fall to us."""
-        self._peer(robot).boots.discard(boot)
+        peer = self._peer(robot)
+        peer.boots.discard(boot)
+        peer.gone = not peer.boots
 
     def learned(self, message: AlignmentMessage) -> None:
         """Take in what a peer found out about our pair: we need not do it again."""
@@ -143,7 +150,7 @@ class ComparisonPlan:
     def _ours(self, name: str) -> bool:
         """Tell whether there is something to compare with a peer, and it is for us to do it."""
         peer = self._peers[name]
-        duty = responsible(self._robot, name) == self._robot or not peer.boots
+        duty = responsible(self._robot, name) == self._robot or peer.gone
         return duty and peer.outdated(self._own)
 
     def _peer(self, name: str) -> _Peer:

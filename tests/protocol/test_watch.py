@@ -1,0 +1,125 @@
+"""The story of a team: what is told, and the command that tells it."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from mapweave_protocol import keys
+from mapweave_protocol.codec import encode
+from mapweave_protocol.inbox import Arrival
+from mapweave_protocol.messages import (
+    AlignmentMessage,
+    JointMapMessage,
+    MapMessage,
+    MapVersion,
+    StatusMessage,
+)
+from mapweave_protocol.session import declare_joint_publisher, declare_map_publisher, open_session
+from mapweave_protocol.story import Story
+from mapweave_protocol.watch import Watcher
+
+from mapweave.maps import Alignment, Decision, JointMap, RobotMap
+
+MakeMap = Callable[..., RobotMap]
+MakeJoint = Callable[..., JointMap]
+MAPWEAVE = Path(sys.executable).with_name("mapweave")
+
+
+def decided(decision: Decision) -> AlignmentMessage:
+    a, b = (MapVersion(robot=robot, boot="x", version=1) for robot in "ab")
+    alignment = Alignment("a/0", "b/0", np.zeros(3), decision, 0.5, "look-alike corridors")
+    return AlignmentMessage.pack("a", a, b, [alignment])
+
+
+def status(seen: int, *, finished: bool = False) -> StatusMessage:
+    return StatusMessage(
+        robot="a",
+        boot="b1",
+        stamp=0.0,
+        state="finished" if finished else "mapping",
+        scans_seen=seen,
+        scans_placed=seen,
+        components=1,
+        submaps=1,
+        map_version=1,
+    )
+
+
+def test_a_robot_that_comes_and_goes_is_told_once_each() -> None:
+    story = Story()
+    lines = [*story.appeared("a", "b1"), *story.appeared("a", "b1"), *story.left("a", "b1")]
+    assert lines == ["a is here", "a is gone"]
+
+
+def test_a_run_that_another_one_followed_may_go_untold() -> None:
+    story = Story()
+    lines = [*story.appeared("a", "b1"), *story.appeared("a", "b2"), *story.left("a", "b1")]
+    assert lines == ["a is here", "a is here"]
+
+
+def test_a_map_is_told_when_it_has_another_submap(random_map: MakeMap) -> None:
+    story = Story()
+    one, two = random_map(1, 1), random_map(1, 2, version=3)
+    lines = [*story.mapped(one), *story.mapped(replace(one, version=2)), *story.mapped(two)]
+    assert lines[0].startswith("a: 1 submap,")
+    assert len(lines) == 2
+
+
+def test_a_decision_is_told_when_it_is_new_with_confidence_and_reason() -> None:
+    story = Story()
+    decisions: list[Decision] = ["ambiguous", "ambiguous", "accepted"]
+    lines = [line for decision in decisions for line in story.aligned(decided(decision))]
+    assert lines == [
+        "a/0 and b/0: ambiguous, confidence 0.50 (look-alike corridors)",
+        "a/0 and b/0: accepted, confidence 0.50 (look-alike corridors)",
+    ]
+
+
+def test_the_end_of_mapping_is_told_once() -> None:
+    story = Story()
+    lines = [
+        *story.status(status(5)),
+        *story.status(status(9, finished=True)),
+        *story.status(status(9, finished=True)),
+    ]
+    assert lines == ["a has finished: 9 scans, 9 placed"]
+
+
+def test_a_version_of_the_joint_map_is_told_once_with_its_components(
+    random_joint: MakeJoint,
+) -> None:
+    watcher = Watcher()
+    payload = encode(JointMapMessage.pack(random_joint(1, 4), "s1"))
+    arrival = Arrival(keys.JOINT_MAP.build(team="t"), payload)
+    lines = [*watcher.tell(arrival), *watcher.tell(arrival)]
+    assert len(lines) == 1
+    assert lines[0].startswith("joint map 4: a/0 + b/0 (")
+
+
+def test_what_is_no_message_is_not_told() -> None:
+    watcher = Watcher()
+    for key in (keys.MAP.build(team="t", robot="a"), "mapweave/@v1/t/@live/NO ID/1", "elsewhere"):
+        assert list(watcher.tell(Arrival(key, b"junk"))) == []
+
+
+def test_the_command_tells_what_happens_line_by_line(
+    endpoint: str, team: str, random_map: MakeMap, random_joint: MakeJoint
+) -> None:
+    command = [str(MAPWEAVE), "watch", "--team", team, "--connect", endpoint]
+    with (
+        open_session([endpoint], patience=20.0) as session,
+        declare_map_publisher(session, keys.MAP.build(team=team, robot="a")) as maps,
+        declare_joint_publisher(session, keys.JOINT_MAP.build(team=team)) as joints,
+        session.liveliness().declare_token(keys.LIVE.build(team=team, robot="a", boot="b1")),
+    ):
+        maps.put(encode(MapMessage.pack(random_map(1, 2))))
+        joints.put(encode(JointMapMessage.pack(random_joint(1, 4), "s1")))
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watching:
+            assert watching.stdout is not None
+            lines = sorted(watching.stdout.readline() for _ in range(3))
+            watching.send_signal(signal.SIGTERM)
+    assert [line.split()[:2] for line in lines] == [["a", "is"], ["a:", "2"], ["joint", "map"]]
