@@ -113,6 +113,7 @@ class Agent:
     def _finish(self) -> None:
         """Publish the last map, whole, and say that it is the last."""
         self._finished = True
+        self._mapper.finish()
         self._publish_map(complete=True)
         self._publish_status()
         _log.info(
