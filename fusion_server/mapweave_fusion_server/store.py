@@ -32,10 +32,10 @@ CREATE TABLE version (
 CREATE TABLE alignment (
     id INTEGER PRIMARY KEY,
     received REAL NOT NULL,
-    reference TEXT NOT NULL,         -- robots of the pair, in ascending order
-    other TEXT NOT NULL,
+    first TEXT NOT NULL,             -- robots of the pair, in ascending order
+    second TEXT NOT NULL,
     message BLOB NOT NULL);
-CREATE INDEX alignment_pair ON alignment (reference, other);
+CREATE INDEX alignment_pair ON alignment (first, second);
 CREATE TABLE robot_map (
     robot TEXT PRIMARY KEY,
     received REAL NOT NULL,
@@ -71,7 +71,9 @@ class Store:
         self._lock = threading.Lock()
         fresh = _check_header(path)
         with self._errors_reported():
-            self._connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+            self._connection = sqlite3.connect(
+                path, timeout=0.0, isolation_level=None, check_same_thread=False
+            )
         try:
             self._prepare(team, fresh)
         except FileError:
@@ -113,19 +115,18 @@ class Store:
             if message is not None:
                 yield message
 
-    def add_alignments(self, reference: str, other: str, received: float, message: bytes) -> None:
+    def add_alignments(self, pair: tuple[str, str], received: float, message: bytes) -> None:
         """Keep what was found for a pair of robots, beside all that was found before."""
-        first, second = sorted((reference, other))
         self._rows(
-            "INSERT INTO alignment (received, reference, other, message) VALUES (?, ?, ?, ?)",
-            received, first, second, message,
+            "INSERT INTO alignment (received, first, second, message) VALUES (?, ?, ?, ?)",
+            received, *sorted(pair), message,
         )  # fmt: skip
 
-    def alignment_history(self, reference: str, other: str) -> list[tuple[float, bytes]]:
+    def alignment_history(self, pair: tuple[str, str]) -> list[tuple[float, bytes]]:
         """Return when [s since 1970] and what was found for a pair of robots, oldest first."""
         rows = self._rows(
-            "SELECT received, message FROM alignment WHERE reference = ? AND other = ? ORDER BY id",
-            *sorted((reference, other)),
+            "SELECT received, message FROM alignment WHERE first = ? AND second = ? ORDER BY id",
+            *sorted(pair),
         )
         return [(float(received), bytes(message)) for received, message in rows]
 
@@ -133,7 +134,7 @@ class Store:
         """Return the last message of every pair of robots."""
         return self._blobs(
             "SELECT message FROM alignment WHERE id IN"
-            " (SELECT max(id) FROM alignment GROUP BY reference, other) ORDER BY id"
+            " (SELECT max(id) FROM alignment GROUP BY first, second) ORDER BY id"
         )
 
     def keep_map(self, robot: str, received: float, message: bytes) -> None:

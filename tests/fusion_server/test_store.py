@@ -33,8 +33,8 @@ def test_everything_is_still_there_after_a_restart(path: Path) -> None:
         _fill(store, 3)
         store.keep_map("a", 5.0, b"old map")
         store.keep_map("a", 6.0, b"map")
-        store.add_alignments("b", "a", 5.5, b"refused")
-        store.add_alignments("a", "b", 6.5, b"accepted")
+        store.add_alignments(("b", "a"), 5.5, b"refused")
+        store.add_alignments(("a", "b"), 6.5, b"accepted")
     with Store(path, "rescue") as store:
         assert store.series == series
         assert store.latest_version == 3
@@ -42,7 +42,7 @@ def test_everything_is_still_there_after_a_restart(path: Path) -> None:
         assert list(store.versions_since(1)) == [b"version 2", b"version 3"]
         assert store.map_of("a") == b"map"
         assert store.last_maps() == [b"map"]
-        assert store.alignment_history("a", "b") == [(5.5, b"refused"), (6.5, b"accepted")]
+        assert store.alignment_history(("a", "b")) == [(5.5, b"refused"), (6.5, b"accepted")]
         assert store.last_alignments() == [b"accepted"]
 
 
@@ -64,7 +64,7 @@ def test_news_is_what_came_after_the_last_version_was_begun(path: Path) -> None:
         assert store.holds_news
         store.add_version(1, 6.0, b"version 1")
         assert not store.holds_news
-        store.add_alignments("a", "b", 7.0, b"accepted")
+        store.add_alignments(("a", "b"), 7.0, b"accepted")
         assert store.holds_news
 
 

@@ -1,0 +1,40 @@
+"""What the store says to a query: payloads, or why there is none."""
+
+from collections.abc import Iterator
+
+from mapweave.errors import MapweaveError
+from mapweave_fusion_server.store import Store
+from mapweave_protocol.queries import JointQuery
+
+
+class NothingToAnswerError(MapweaveError):
+    """A query that is in order, about something that is not there."""
+
+
+def answer(store: Store, parameters: str) -> Iterator[bytes]:
+    """Yield the payloads that answer the selector's `parameters`.
+
+    Raises
+    ------
+    MessageError
+        If `parameters` are no query.
+    NothingToAnswerError
+        If what is asked for is not there.
+    """
+    query = JointQuery.parse(parameters)
+    if query.since is not None:
+        yield from store.versions_since(query.since)
+    elif query.robot is not None:
+        yield _found(store.map_of(query.robot), f"no map of robot {query.robot}")
+    elif query.version is not None:
+        latest = store.latest_version
+        missing = f"no version {query.version} of the joint map; there are 1 to {latest}"
+        yield _found(store.version(query.version), missing)
+    else:
+        yield _found(store.version(store.latest_version), "no joint map: there is none yet")
+
+
+def _found(message: bytes | None, otherwise: str) -> bytes:
+    if message is None:
+        raise NothingToAnswerError(otherwise)
+    return message

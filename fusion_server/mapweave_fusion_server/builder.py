@@ -1,0 +1,94 @@
+"""Builds versions in a thread of its own, so that receiving goes on meanwhile."""
+
+import logging
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from types import TracebackType
+
+from mapweave.maps import JointMap
+from mapweave_fusion_server.coordinator import Draft
+from mapweave_protocol.codec import encode
+from mapweave_protocol.messages import JointMapMessage
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Built:
+    """A version that is ready.
+
+    Attributes
+    ----------
+    draft
+        What it was made of.
+    begun
+        When that was all that was known [s since 1970].
+    joint
+        The joint map.
+    payload
+        Its message.
+    """
+
+    draft: Draft
+    begun: float
+    joint: JointMap
+    payload: bytes
+
+
+class Builder:
+    """Builds one draft at a time; a context manager that waits for the last one.
+
+    Parameters
+    ----------
+    series
+        Names the numbering, for the message.
+    """
+
+    def __init__(self, series: str) -> None:
+        self._series = series
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
+        self._future: Future[Built] | None = None
+
+    def __enter__(self) -> "Builder":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._worker.shutdown(wait=True)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a draft was started and not yet taken."""
+        return self._future is not None
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether `take` returns at once."""
+        return self._future is not None and self._future.done()
+
+    def start(self, draft: Draft, begun: float) -> None:
+        """Start building `draft`, made of all that was known at `begun` [s since 1970]."""
+        self._future = self._worker.submit(self._build, draft, begun)
+
+    def take(self) -> Built | None:
+        """Return the version that was started, when it is done; None when it could not be built.
+
+        That is logged as the fault it is: a map nobody expected must not end the service, and the
+        next change brings another try.
+        """
+        future, self._future = self._future, None
+        if future is None:
+            return None
+        error = future.exception()
+        if error is not None:
+            _log.error("a version could not be built: %s", error, exc_info=error)
+            return None
+        return future.result()
+
+    def _build(self, draft: Draft, begun: float) -> Built:
+        joint = draft.build()
+        return Built(draft, begun, joint, encode(JointMapMessage.pack(joint, self._series)))

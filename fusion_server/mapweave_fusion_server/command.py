@@ -1,0 +1,81 @@
+"""``mapweave server``: the coordinator of a team."""
+
+import argparse
+import logging
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+from mapweave.cli import Command
+from mapweave_fusion_server.coordinator import CoordinatorParameters
+from mapweave_fusion_server.service import Service
+from mapweave_fusion_server.store import Store
+from mapweave_protocol.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.session import open_session
+
+DEFAULT_INTERVAL: float = CoordinatorParameters().min_interval
+
+_log = logging.getLogger(__name__)
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    add_connection_arguments(parser)
+    parser.add_argument(
+        "--store",
+        type=Path,
+        metavar="FILE",
+        help="what is remembered; numbering goes on from there (default mapweave-TEAM.sqlite)",
+    )
+    parser.add_argument(
+        "--min-interval",
+        type=_seconds,
+        default=DEFAULT_INTERVAL,
+        metavar="S",
+        help="least time between two versions [s] unless maps are joined or parted"
+        f" (default {DEFAULT_INTERVAL:g})",
+    )
+
+
+def _run(options: argparse.Namespace) -> int:
+    logging.basicConfig(
+        stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S"
+    )
+    team, endpoints = connection_of(options)
+    parameters = CoordinatorParameters(min_interval=options.min_interval)
+    path = options.store or Path(f"mapweave-{team}.sqlite")
+
+    def tell_waiting() -> None:
+        _log.info("waiting for a router at %s", ", ".join(endpoints))
+
+    with (
+        Store(path, team) as store,
+        open_session(endpoints, on_wait=tell_waiting) as session,
+    ):
+        Service(session, team, store, parameters).run(_stop_on_signal())
+    return 0
+
+
+def _stop_on_signal() -> Callable[[], bool]:
+    """Return what tells whether a signal to stop has come; the second one ends the process."""
+    came: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        came.append(number)
+        for stopping in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(stopping, signal.SIG_DFL)
+
+    for stopping in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(stopping, note)
+    return lambda: bool(came)
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text}: expected seconds, 0 or more")
+    return value
+
+
+command = Command("coordinate a team: maps and alignments in, joint maps out", _configure, _run)

@@ -1,0 +1,210 @@
+"""What the team knows, and when it is worth a new version of the joint map.
+
+Pure logic: no network, no clock (`now` is passed in), no threads. The caller runs the drafts.
+"""
+
+import math
+from collections.abc import Iterator, Set
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.assembly import assemble
+from mapweave.joint import build_joint_map
+from mapweave.maps import Alignment, JointMap, RobotMap, component_name
+from mapweave_protocol.messages import AlignmentMessage, MapVersion
+
+Run: TypeAlias = tuple[str, str]  # robot and boot
+
+
+class CoordinatorParameters(BaseModel):
+    """How often versions are made, and of how large a team."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    min_interval: float = Field(default=2.0, ge=0, allow_inf_nan=False)
+    """Least time between two versions [s] unless an alignment is joined or revoked: a person
+    watching sees the map grow, and building takes a fraction of it."""
+
+    max_robots: int = Field(default=64, ge=1)
+    """Robots listened to; the largest teams of the DARPA Subterranean Challenge had a dozen."""
+
+
+class Urgency(IntEnum):
+    """How soon the next version is due."""
+
+    NONE = 0
+    SOON = 1
+    NOW = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """All that goes into a version; building it takes seconds and changes nothing here."""
+
+    version: int
+    maps: tuple[RobotMap, ...]
+    alignments: tuple[Alignment, ...]
+
+    def build(self) -> JointMap:
+        """Return the joint map."""
+        components = {
+            component_name(robot_map.robot, component): assemble(robot_map, component)
+            for robot_map in self.maps
+            for component in robot_map.components
+        }
+        return build_joint_map(components, self.alignments, self.version)
+
+
+class Coordinator:
+    """Takes maps and alignments; says what goes into the next version, and when.
+
+    Parameters
+    ----------
+    parameters
+        See there.
+    last_version
+        Where the numbering stands; 0 before the first version.
+    """
+
+    def __init__(self, parameters: CoordinatorParameters, last_version: int = 0) -> None:
+        self._parameters = parameters
+        self._version = last_version
+        self._names: set[str] = set()
+        self._maps: dict[str, RobotMap] = {}
+        self._alignments: dict[frozenset[str], AlignmentMessage] = {}
+        self._runs_over: set[Run] = set()
+        self._urgency = Urgency.NONE
+        self._draft: Draft | None = None
+        self._begun = -math.inf
+
+    @property
+    def has_news(self) -> bool:
+        """Whether something that matters is in no draft yet."""
+        return self._urgency > Urgency.NONE
+
+    def map_of(self, robot: str) -> RobotMap | None:
+        """Return a robot's last map, None when there is none."""
+        return self._maps.get(robot)
+
+    def alignments_of(self, pair: frozenset[str]) -> AlignmentMessage | None:
+        """Return what was last found for a pair of robots, None when nothing was."""
+        return self._alignments.get(pair)
+
+    def admits(self, robots: Set[str]) -> bool:
+        """Return whether these robots are listened to; from the first time they are."""
+        if len(self._names | robots) > self._parameters.max_robots:
+            return False
+        self._names |= robots
+        return True
+
+    def receive_map(self, new: RobotMap) -> bool:
+        """Take a robot's map; return whether it is news.
+
+        It is not when it is no newer than the one known, of a run that another one replaced (two
+        robots under one name must not replace each other for ever), or empty: a run that has
+        mapped nothing yet does not replace what an earlier one mapped.
+        """
+        if not new.submaps or not self.admits({new.robot}) or _run(new) in self._runs_over:
+            return False
+        known = self._maps.get(new.robot)
+        if known is not None and known.boot != new.boot:
+            self._runs_over.add(_run(known))
+        elif known is not None and known.version >= new.version:
+            return False
+        self._maps[new.robot] = new
+        self._raise_urgency(Urgency.SOON)
+        return True
+
+    def receive_alignments(self, new: AlignmentMessage) -> bool:
+        """Take what was found for a pair of robots; return whether it is news.
+
+        It is not when what is known was computed from newer maps or says the same, or when a
+        run it is about is over.
+        """
+        pair = pair_of(new)
+        if not self.admits(pair) or not self._runs_over.isdisjoint(_sources(new)):
+            return False
+        known = self._alignments.get(pair)
+        if known is not None and _is_older(new, known):
+            return False
+        self._alignments[pair] = new
+        if known is not None and new.alignments == known.alignments:
+            return False
+        joined_or_parted = _accepted_links(new) != _accepted_links(known)
+        self._raise_urgency(Urgency.NOW if joined_or_parted else Urgency.SOON)
+        return True
+
+    def forget_news(self) -> None:
+        """Take what was received so far as part of the last version: after a restart."""
+        self._urgency = Urgency.NONE
+
+    def seconds_until_due(self, now: float) -> float:
+        """Return how long to wait from `now` [s] before the next draft; infinite without news."""
+        if self._draft is not None or not self.has_news:
+            return math.inf
+        if self._urgency is Urgency.NOW:
+            return 0.0
+        return max(0.0, self._begun + self._parameters.min_interval - now)
+
+    def begin(self, now: float) -> Draft:
+        """Return the draft of the next version, made of all that is known; `finish` must follow."""
+        if self._draft is not None:
+            raise RuntimeError("the last draft is not finished")
+        maps = tuple(self._maps[robot] for robot in sorted(self._maps))
+        self._draft = Draft(self._version + 1, maps, tuple(self._alignments_in_force()))
+        self._begun, self._urgency = now, Urgency.NONE
+        return self._draft
+
+    def finish(self, *, built: bool) -> None:
+        """End the draft; a version that could not be built leaves its number to the next."""
+        if self._draft is not None and built:
+            self._version = self._draft.version
+        self._draft = None
+
+    def _alignments_in_force(self) -> Iterator[Alignment]:
+        """Yield the alignments between components that exist, of the runs that last mapped them."""
+        runs = {_run(robot_map) for robot_map in self._maps.values()}
+        existing = {
+            component_name(robot_map.robot, component)
+            for robot_map in self._maps.values()
+            for component in robot_map.components
+        }
+        for message in self._alignments.values():
+            if runs.issuperset(_sources(message)):
+                for alignment in message.unpack():
+                    if {alignment.reference, alignment.other} <= existing:
+                        yield alignment
+
+    def _raise_urgency(self, urgency: Urgency) -> None:
+        self._urgency = max(self._urgency, urgency)
+
+
+def pair_of(message: AlignmentMessage) -> frozenset[str]:
+    """Return the robots compared; one when a robot's own components were."""
+    return frozenset({message.reference.robot, message.other.robot})
+
+
+def _is_older(new: AlignmentMessage, known: AlignmentMessage) -> bool:
+    """Whether `new` was computed from maps of the same runs of which none is newer, one older."""
+    now, before = _sources(new), _sources(known)
+    if now.keys() != before.keys():
+        return False
+    steps = [now[run] - before[run] for run in now]
+    return max(steps) <= 0 and min(steps) < 0
+
+
+def _sources(message: AlignmentMessage) -> dict[Run, int]:
+    """Return the version of the map of each run that was compared."""
+    return {_run(source): source.version for source in (message.reference, message.other)}
+
+
+def _run(source: RobotMap | MapVersion) -> Run:
+    return source.robot, source.boot
+
+
+def _accepted_links(message: AlignmentMessage | None) -> set[frozenset[str]]:
+    alignments = message.alignments if message else ()
+    return {frozenset({a.reference, a.other}) for a in alignments if a.decision == "accepted"}

@@ -1,0 +1,113 @@
+"""From what arrives to the coordinator and the store: checked, remembered, told.
+
+Whatever arrives, nothing but `FileError` leaves here: what is no proper message is logged, counted
+and dropped. Knows no clock.
+"""
+
+import logging
+from collections import defaultdict
+from collections.abc import Set
+
+from mapweave.errors import FileError, InvalidIdError
+from mapweave_fusion_server.coordinator import Coordinator, pair_of
+from mapweave_fusion_server.journal import record
+from mapweave_fusion_server.store import Store
+from mapweave_protocol.assembler import MapAssembler, MapSender
+from mapweave_protocol.codec import decode
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.inbox import Arrival, alignment_reader, map_reader
+from mapweave_protocol.keys import LIVE
+from mapweave_protocol.messages import AlignmentMessage, MapMessage
+from mapweave_protocol.story import Story
+
+_log = logging.getLogger(__name__)
+
+
+class Intake:
+    """Takes what arrives for a coordinator, and remembers in a store what was news.
+
+    Parameters
+    ----------
+    coordinator, store
+        Where the news goes.
+    story
+        Turns what happens into lines for the log.
+    """
+
+    def __init__(self, coordinator: Coordinator, store: Store, story: Story) -> None:
+        self._coordinator = coordinator
+        self._store = store
+        self._story = story
+        self._maps = map_reader()
+        self._alignments = alignment_reader()
+        self._assembler = MapAssembler()
+        self._packers: defaultdict[str, MapSender] = defaultdict(MapSender)
+        self._warned_of_too_many = False
+
+    @property
+    def refused(self) -> int:
+        """How many messages were dropped because they were not what they should be."""
+        return self._maps.refused + self._alignments.refused
+
+    def restore(self) -> None:
+        """Take up what the store remembers; what the last version was made of is no news.
+
+        Raises
+        ------
+        FileError
+            If the store holds something unreadable.
+        """
+        try:
+            for payload in self._store.last_maps():
+                robot_map = self._assembler.update(decode(MapMessage, payload))
+                if robot_map is not None:
+                    self._coordinator.receive_map(robot_map)
+            for payload in self._store.last_alignments():
+                self._coordinator.receive_alignments(decode(AlignmentMessage, payload))
+        except MessageError as error:
+            raise FileError(self._store.path, f"the store is damaged: {error}") from error
+        if not self._store.holds_news:
+            self._coordinator.forget_news()
+
+    def take(self, arrival: Arrival, received: float) -> None:
+        """Take what arrived at `received` [s since 1970]."""
+        if self._maps.reads(arrival):
+            map_message = self._maps.read(arrival)
+            if map_message is not None and self._hears({map_message.robot}):
+                self._take_map(map_message, received)
+        elif self._alignments.reads(arrival):
+            message = self._alignments.read(arrival)
+            if message is not None and self._hears(pair_of(message)):
+                self._take_alignments(message, arrival.payload, received)
+        elif LIVE.matches(arrival.key):
+            self._take_presence(arrival)
+
+    def _take_map(self, message: MapMessage, received: float) -> None:
+        new = self._assembler.update(message)
+        if new is not None and self._coordinator.receive_map(new):
+            # Kept complete, whatever part of it has just come.
+            complete = self._packers[new.robot].payload(new, complete=True)
+            self._store.keep_map(new.robot, received, complete)
+            record(self._story.mapped(new))
+
+    def _take_alignments(self, new: AlignmentMessage, payload: bytes, received: float) -> None:
+        if self._coordinator.receive_alignments(new):
+            pair = new.reference.robot, new.other.robot
+            self._store.add_alignments(pair, received, payload)
+            record(self._story.aligned(new))
+
+    def _take_presence(self, arrival: Arrival) -> None:
+        try:
+            run = LIVE.parse(arrival.key)
+        except InvalidIdError:
+            return  # not one of ours, and nothing depends on it
+        del run["team"]
+        if self._hears({run["robot"]}):
+            record(self._story.left(**run) if arrival.gone else self._story.appeared(**run))
+
+    def _hears(self, robots: Set[str]) -> bool:
+        heard = self._coordinator.admits(robots)
+        if not heard and not self._warned_of_too_many:
+            self._warned_of_too_many = True
+            _log.warning("%s ignored: there are too many robots already", ", ".join(sorted(robots)))
+        return heard

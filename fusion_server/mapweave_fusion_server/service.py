@@ -1,0 +1,173 @@
+"""The coordinator on Zenoh: receives, builds, stores, publishes, answers."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+import zenoh
+
+from mapweave.errors import MapweaveError
+from mapweave_fusion_server.answers import answer
+from mapweave_fusion_server.builder import Builder
+from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
+from mapweave_fusion_server.intake import Intake
+from mapweave_fusion_server.journal import record, tell_set_aside
+from mapweave_fusion_server.store import Store
+from mapweave_protocol import keys, session
+from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.inbox import Inbox
+from mapweave_protocol.story import Story
+
+POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
+ANSWERERS = 4  # one slow asker must not keep the others waiting
+WAITING_QUERIES = 256
+
+_log = logging.getLogger(__name__)
+
+
+class Service:
+    """The coordinator of a team.
+
+    Parameters
+    ----------
+    zenoh_session
+        An open session; it stays the caller's.
+    team
+        The team's name.
+    store
+        What is remembered; numbering goes on from there.
+    parameters
+        Of the coordinator.
+
+    Raises
+    ------
+    FileError
+        If the store holds something unreadable.
+    """
+
+    def __init__(
+        self,
+        zenoh_session: zenoh.Session,
+        team: str,
+        store: Store,
+        parameters: CoordinatorParameters,
+    ) -> None:
+        self._session = zenoh_session
+        self._team = team
+        self._store = store
+        self._coordinator = Coordinator(parameters, store.latest_version)
+        self._story = Story()
+        self._intake = Intake(self._coordinator, store, self._story)
+        self._intake.restore()
+        self._inbox = Inbox()
+        self._builder = Builder(store.series)
+
+    def run(self, stopping: Callable[[], bool]) -> None:
+        """Serve until `stopping`; then publish what is pending.
+
+        Raises
+        ------
+        FileError
+            If the store cannot be written.
+        """
+        joint_key = keys.JOINT_MAP.build(team=self._team)
+        with self._builder, self._answering(), self._listening():
+            self._publisher = session.declare_joint_publisher(self._session, joint_key)
+            self._publish_again()
+            _log.info("coordinating team %s", self._team)
+            while not stopping():
+                self._step()
+            self._finish()
+
+    def _step(self) -> None:
+        """Take one message, then do what is due."""
+        due = self._coordinator.seconds_until_due(time.monotonic())
+        arrival = self._inbox.get(min(POLL, due))
+        if arrival is not None:
+            self._intake.take(arrival, time.time())
+        if self._builder.is_ready:
+            self._conclude()
+        if self._coordinator.seconds_until_due(time.monotonic()) <= 0:
+            self._begin()
+
+    def _finish(self) -> None:
+        """Take what has arrived and publish what it makes."""
+        while (arrival := self._inbox.get(0.0)) is not None:
+            self._intake.take(arrival, time.time())
+        if self._builder.is_busy:
+            self._conclude()
+        if self._coordinator.has_news:
+            self._begin()
+            self._conclude()
+        if self._intake.refused:
+            _log.warning("%d messages were not valid and dropped", self._intake.refused)
+
+    def _begin(self) -> None:
+        self._builder.start(self._coordinator.begin(time.monotonic()), time.time())
+
+    def _conclude(self) -> None:
+        built = self._builder.take()
+        if built is not None:
+            # Stored first: what was published once must be there after a crash.
+            self._store.add_version(built.draft.version, built.begun, built.payload)
+            self._publisher.put(built.payload)
+            record(self._story.joined(built.joint))
+            record(tell_set_aside(built.draft.alignments, built.joint))
+        self._coordinator.finish(built=built is not None)
+
+    def _publish_again(self) -> None:
+        """Publish the latest version of the store: the cache died with the last publisher."""
+        latest = self._store.version(self._store.latest_version)
+        if latest is not None:
+            self._publisher.put(latest)
+            _log.info("version %d published again", self._store.latest_version)
+
+    @contextmanager
+    def _listening(self) -> Iterator[None]:
+        """Subscribe to maps, alignments and who is there."""
+        maps = keys.MAP.pattern(team=self._team)
+        alignments = keys.ALIGNMENT.pattern(team=self._team)
+        live = keys.LIVE.pattern(team=self._team)
+        put = self._inbox.put
+        with ExitStack() as stack:
+            for subscriber in (
+                session.declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
+                session.declare_subscriber(self._session, alignments, put),
+                self._session.liveliness().declare_subscriber(live, put, history=True),
+            ):
+                stack.enter_context(subscriber)
+            yield
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Answer queries in threads of their own."""
+        key = keys.JOINT_QUERY.build(team=self._team)
+        channel: zenoh.handlers.FifoChannel[zenoh.Query]
+        channel = zenoh.handlers.FifoChannel(WAITING_QUERIES)
+        queryable = self._session.declare_queryable(key, channel)
+        threads = [
+            threading.Thread(target=self._answer_all, args=(key, queryable.handler), daemon=True)
+            for _ in range(ANSWERERS)
+        ]
+        for thread in threads:
+            thread.start()
+        try:
+            yield
+        finally:
+            queryable.undeclare()  # type: ignore[no-untyped-call]  # it ends the threads' loops
+            for thread in threads:
+                thread.join()
+
+    def _answer_all(self, key: str, queries: zenoh.handlers.Handler[zenoh.Query]) -> None:
+        for query in queries:
+            with query:
+                self._answer(key, query)
+
+    def _answer(self, key: str, query: zenoh.Query) -> None:
+        try:
+            for payload in answer(self._store, str(query.parameters)):
+                query.reply(key, payload)
+        except MapweaveError as error:
+            query.reply_err(str(error))

@@ -1,0 +1,239 @@
+"""When a version is due, what goes into it, and that the numbers leave no gap."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from mapweave.maps import RobotMap
+from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters, Draft
+
+if TYPE_CHECKING:
+    from tests.fusion_server.conftest import MakeAlignments, MakeMap
+
+
+def _coordinator(last_version: int = 0, **parameters: float) -> Coordinator:
+    return Coordinator(CoordinatorParameters.model_validate(parameters), last_version)
+
+
+def _make_version(coordinator: Coordinator, now: float = 0.0) -> Draft:
+    draft = coordinator.begin(now)
+    coordinator.finish(built=True)
+    return draft
+
+
+def _decisions(draft: Draft) -> list[str]:
+    return [alignment.decision for alignment in draft.alignments]
+
+
+def test_no_version_is_due_before_anything_was_received() -> None:
+    assert _coordinator().seconds_until_due(1e9) == math.inf
+
+
+def test_the_first_map_is_due_at_once(make_map: MakeMap) -> None:
+    coordinator = _coordinator()
+    assert coordinator.receive_map(make_map("a"))
+    assert coordinator.seconds_until_due(0.0) == 0.0
+    draft = _make_version(coordinator)
+    assert draft.version == 1
+    assert [robot_map.robot for robot_map in draft.maps] == ["a"]
+
+
+def test_no_version_is_due_when_nothing_changed(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    a, b = make_map("a"), make_map("b")
+    for _ in range(3):
+        coordinator.receive_map(a)
+        coordinator.receive_map(b)
+        coordinator.receive_alignments(make_alignments(a, b))
+        if coordinator.has_news:
+            _make_version(coordinator)
+    assert coordinator.begin(0.0).version == 2
+
+
+def test_a_growing_map_waits_for_the_interval(make_map: MakeMap) -> None:
+    coordinator = _coordinator(min_interval=2.0)
+    coordinator.receive_map(make_map("a", 1))
+    _make_version(coordinator, now=10.0)
+    coordinator.receive_map(make_map("a", 2))
+    assert coordinator.seconds_until_due(10.5) == pytest.approx(1.5)
+    assert coordinator.seconds_until_due(12.0) == 0.0
+    assert coordinator.seconds_until_due(1e9) == 0.0
+
+
+@pytest.mark.parametrize(("before", "after"), [("refused", "accepted"), ("accepted", "refused")])
+def test_joining_and_parting_do_not_wait(
+    make_map: MakeMap, make_alignments: MakeAlignments, before: str, after: str
+) -> None:
+    coordinator = _coordinator(min_interval=1e6)
+    a, b = make_map("a"), make_map("b")
+    for robot_map in (a, b):
+        coordinator.receive_map(robot_map)
+    coordinator.receive_alignments(make_alignments(a, b, before))
+    assert _decisions(_make_version(coordinator)) == [before]
+    coordinator.receive_alignments(make_alignments(a, b, after))
+    assert coordinator.seconds_until_due(0.0) == 0.0
+    assert _decisions(_make_version(coordinator)) == [after]
+
+
+def test_a_moved_transform_waits_for_the_interval(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator(min_interval=2.0)
+    a, b = make_map("a"), make_map("b")
+    coordinator.receive_map(a)
+    coordinator.receive_map(b)
+    coordinator.receive_alignments(make_alignments(a, b))
+    _make_version(coordinator)
+    coordinator.receive_alignments(make_alignments(a, b, transform=(0.1, 0.0, 0.0)))
+    assert coordinator.seconds_until_due(0.0) == 2.0
+    np.testing.assert_allclose(_make_version(coordinator).alignments[0].transform, [0.1, 0, 0])
+
+
+def test_what_arrives_while_building_goes_into_one_next_version(make_map: MakeMap) -> None:
+    coordinator = _coordinator(min_interval=0.0)
+    coordinator.receive_map(make_map("a"))
+    coordinator.begin(0.0)
+    for robot in "bcd":
+        coordinator.receive_map(make_map(robot))
+        assert coordinator.seconds_until_due(100.0) == math.inf
+    coordinator.finish(built=True)
+    draft = _make_version(coordinator, now=100.0)
+    assert draft.version == 2
+    assert [robot_map.robot for robot_map in draft.maps] == ["a", "b", "c", "d"]
+    assert not coordinator.has_news
+
+
+def test_a_version_that_could_not_be_built_leaves_its_number_to_the_next(
+    make_map: MakeMap,
+) -> None:
+    coordinator = _coordinator()
+    coordinator.receive_map(make_map("a"))
+    assert coordinator.begin(0.0).version == 1
+    coordinator.finish(built=False)
+    assert not coordinator.has_news
+    coordinator.receive_map(make_map("b"))
+    assert coordinator.begin(0.0).version == 1
+
+
+def test_numbering_goes_on_after_a_restart(make_map: MakeMap) -> None:
+    coordinator = _coordinator(last_version=41)
+    coordinator.receive_map(make_map("a"))
+    assert _make_version(coordinator).version == 42
+
+
+def test_what_was_restored_is_no_news_until_something_is_added(make_map: MakeMap) -> None:
+    coordinator = _coordinator(last_version=41)
+    coordinator.receive_map(make_map("a"))
+    coordinator.forget_news()
+    assert coordinator.seconds_until_due(1e9) == math.inf
+    assert not coordinator.receive_map(make_map("a"))
+    coordinator.receive_map(make_map("b"))
+    assert [robot_map.robot for robot_map in coordinator.begin(0.0).maps] == ["a", "b"]
+
+
+def test_an_older_map_of_the_same_run_is_ignored(make_map: MakeMap) -> None:
+    coordinator = _coordinator()
+    newest = make_map("a", 5)
+    coordinator.receive_map(newest)
+    assert not coordinator.receive_map(make_map("a", 4))
+    assert coordinator.map_of("a") is newest
+
+
+def test_another_run_replaces_the_map_and_ends_the_run_before_it(make_map: MakeMap) -> None:
+    coordinator = _coordinator()
+    coordinator.receive_map(make_map("a", 9, boot="first"))
+    second = make_map("a", 1, boot="second")
+    assert coordinator.receive_map(second)
+    assert not coordinator.receive_map(make_map("a", 10, boot="first"))
+    assert coordinator.map_of("a") is second
+
+
+def test_a_run_that_has_mapped_nothing_yet_replaces_nothing(make_map: MakeMap) -> None:
+    coordinator = _coordinator()
+    first = make_map("a", 9)
+    coordinator.receive_map(first)
+    assert not coordinator.receive_map(make_map("a", 1, boot="second", components=0))
+    assert coordinator.map_of("a") is first
+
+
+def test_alignments_of_a_run_that_is_over_are_dropped(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    a, b = make_map("a"), make_map("b")
+    coordinator.receive_map(a)
+    coordinator.receive_map(b)
+    coordinator.receive_alignments(make_alignments(a, b))
+    assert _decisions(_make_version(coordinator)) == ["accepted"]
+    coordinator.receive_map(make_map("a", boot="second"))
+    assert _decisions(_make_version(coordinator)) == []
+
+
+def test_late_alignments_of_a_run_that_is_over_replace_nothing(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    a, b = make_map("a"), make_map("b")
+    second = make_map("a", boot="second")
+    for robot_map in (a, b, second):
+        coordinator.receive_map(robot_map)
+    coordinator.receive_alignments(make_alignments(second, b))
+    assert not coordinator.receive_alignments(make_alignments(a, b, "refused"))
+    assert _decisions(_make_version(coordinator)) == ["accepted"]
+
+
+def test_alignments_that_arrive_before_their_maps_count_once_those_are_there(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    a, b = make_map("a"), make_map("b")
+    coordinator.receive_alignments(make_alignments(a, b))
+    coordinator.receive_map(a)
+    assert _decisions(_make_version(coordinator)) == []
+    coordinator.receive_map(b)
+    assert _decisions(_make_version(coordinator)) == ["accepted"]
+
+
+def test_alignments_of_a_component_that_is_gone_are_dropped(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    a, b = make_map("a"), make_map("b")
+    moved = RobotMap("a", "first", 2, tuple(replace(s, component=3) for s in a.submaps))
+    coordinator.receive_map(moved)
+    coordinator.receive_map(b)
+    coordinator.receive_alignments(make_alignments(a, b))
+    assert _decisions(_make_version(coordinator)) == []
+
+
+def test_alignments_from_older_maps_do_not_replace_newer_ones_whoever_found_them(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    a, b = make_map("a", 4), make_map("b", 7)
+    coordinator.receive_map(a)
+    coordinator.receive_map(b)
+    coordinator.receive_alignments(make_alignments(a, b, "accepted"))
+    assert not coordinator.receive_alignments(make_alignments(b, make_map("a", 3), "refused"))
+    assert _decisions(_make_version(coordinator)) == ["accepted"]
+    coordinator.receive_alignments(make_alignments(b, make_map("a", 5), "refused"))
+    assert _decisions(_make_version(coordinator)) == ["refused"]
+
+
+def test_robots_beyond_the_limit_are_not_heard(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator(max_robots=2)
+    a, b, c = (make_map(robot) for robot in "abc")
+    assert coordinator.receive_map(a)
+    assert coordinator.receive_map(b)
+    assert not coordinator.receive_map(c)
+    assert not coordinator.receive_alignments(make_alignments(a, c))
+    assert coordinator.receive_alignments(make_alignments(a, b))

@@ -1,0 +1,63 @@
+"""A server that ends and comes back: nothing is lost, no number is used twice or skipped."""
+
+from __future__ import annotations
+
+import signal
+from typing import TYPE_CHECKING
+
+import pytest
+
+from mapweave_fusion_server.store import Store
+
+if TYPE_CHECKING:
+    from tests.fusion_server.conftest import Found, MakeMap, Network, ServerProcess, StartServer
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_after_a_restart_the_latest_is_published_again_and_numbering_goes_on(
+    network: Network,
+    finished_team: ServerProcess,
+    start_server: StartServer,
+    make_map: MakeMap,
+    how: int,
+) -> None:
+    finished_team.stop(how)
+    watcher = network.watcher()
+    start_server()
+    assert watcher.next().version == 3
+    with network.robot("c") as c:
+        c.publish_map(make_map("c"))
+        following = watcher.next()
+    assert following.version == 4
+    assert network.groups(following) == [["a/0", "b/0"], ["c/0"]]
+
+
+def test_nothing_new_after_a_restart_makes_no_version(
+    network: Network,
+    finished_team: ServerProcess,
+    start_server: StartServer,
+    found: Found,
+) -> None:
+    finished_team.stop()
+    server = start_server()
+    with network.robot("a") as a:
+        a.publish_map(found[0])
+        server.wait_for_log("a is here")
+    server.wait_for_log("a is gone")
+    assert server.stop() == 0
+    with Store(server.store, network.team) as store:
+        assert store.latest_version == 3
+
+
+def test_the_first_signal_publishes_what_is_pending(
+    network: Network, start_server: StartServer, make_map: MakeMap
+) -> None:
+    server = start_server(interval=1e6)
+    watcher = network.watcher()
+    with network.robot("a") as a:
+        a.publish_map(make_map("a"))
+        assert watcher.next().version == 1
+        a.publish_map(make_map("a", 2, components=2))
+        server.wait_for_log("a: 2 submaps")
+        assert server.stop(signal.SIGTERM) == 0
+    assert network.groups(watcher.next()) == [["a/0"], ["a/1"]]

@@ -1,0 +1,134 @@
+"""The coordinator as a process: a real router, a real server, sessions of robots and watchers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import mapweave_protocol
+from mapweave_protocol import keys
+from mapweave_protocol.asking import ask_joint_maps, ask_robot_map
+from mapweave_protocol.assembler import MapAssembler
+from mapweave_protocol.codec import encode
+from mapweave_protocol.messages import MapMessage
+from mapweave_protocol.queries import JointQuery
+
+if TYPE_CHECKING:
+    from tests.fusion_server.conftest import (
+        Found,
+        MakeAlignments,
+        MakeMap,
+        Network,
+        ServerProcess,
+        StartServer,
+    )
+
+
+def test_who_listened_before_sees_joining_and_parting_as_versions_1_2_3_4(
+    network: Network,
+    start_server: StartServer,
+    found: Found,
+    make_alignments: MakeAlignments,
+) -> None:
+    start_server()
+    watcher = network.watcher()
+    map_a, map_b, alignments = found
+    with network.robot("a") as a, network.robot("b") as b:
+        a.publish_map(map_a)
+        seen = [watcher.next()]
+        b.publish_map(map_b)
+        seen.append(watcher.next())
+        a.publish_alignments(alignments)
+        seen.append(watcher.next())
+        later = replace(map_b, version=2)
+        a.publish_alignments(make_alignments(map_a, later, "refused", reason="walls in the way"))
+        seen.append(watcher.next())
+    assert [joint.version for joint in seen] == [1, 2, 3, 4]
+    apart, together = [["a/0"], ["b/0"]], [["a/0", "b/0"]]
+    assert [network.groups(joint) for joint in seen] == [[["a/0"]], apart, together, apart]
+    assert [a.reason for a in seen[3].alignments] == ["walls in the way"]
+
+
+@pytest.mark.usefixtures("finished_team")
+def test_who_comes_after_the_team_has_finished_gets_the_latest_joint_map(
+    network: Network,
+) -> None:
+    latest = next(
+        mapweave_protocol.joint_maps(
+            network.team, connect=[network.endpoint], timeout=network.patience
+        )
+    )
+    assert latest.version == 3
+    assert network.groups(latest) == [["a/0", "b/0"]]
+
+
+@pytest.mark.usefixtures("finished_team")
+def test_queries_give_the_latest_one_version_all_since_or_a_reason(
+    network: Network,
+) -> None:
+    connection = network.connect()
+
+    def versions(query: JointQuery) -> list[int]:
+        return [answer.version for answer in ask_joint_maps(connection, network.team, query)]
+
+    assert versions(JointQuery()) == [3]
+    assert versions(JointQuery(version=2)) == [2]
+    assert versions(JointQuery(since=1)) == [2, 3]
+    assert versions(JointQuery(since=3)) == []
+    [reply] = connection.get(f"{keys.JOINT_QUERY.build(team=network.team)}?version=4")
+    assert reply.err is not None
+    assert "no version 4" in reply.err.payload.to_string()
+
+
+def test_the_last_map_of_a_robot_that_is_gone_can_be_asked_for(
+    network: Network, finished_team: ServerProcess, found: Found
+) -> None:
+    finished_team.wait_for_log("a is gone")
+    message = ask_robot_map(network.connect(), network.team, "a")
+    assert message is not None
+    robot_map = MapAssembler().update(message)
+    assert robot_map is not None
+    [submap], [sent] = robot_map.submaps, found[0].submaps
+    np.testing.assert_allclose(submap.map.segments, sent.map.segments, atol=1e-3)
+    assert ask_robot_map(network.connect(), network.team, "nobody") is None
+
+
+def test_a_server_that_comes_after_the_robots_have_finished_learns_what_they_found(
+    network: Network, start_server: StartServer, found: Found
+) -> None:
+    watcher = network.watcher()
+    map_a, map_b, alignments = found
+    with network.robot("a") as a, network.robot("b") as b:
+        a.publish_map(map_a)
+        b.publish_map(map_b)
+        a.publish_alignments(alignments)
+        start_server()
+        while network.groups(watcher.next()) != [["a/0", "b/0"]]:
+            pass
+
+
+def test_hostile_messages_are_dropped_and_told_of(
+    network: Network, start_server: StartServer, make_map: MakeMap
+) -> None:
+    server = start_server()
+    watcher = network.watcher()
+    mallory = network.connect()
+    robot = f"mapweave/@v1/{network.team}/agent/m"
+    someone = encode(MapMessage.pack(make_map("a")))
+    for payload in (b"", b"\xc1", b"\xdd\xff\xff\xff\xff", someone[:-7], someone):
+        for key in (f"{robot}/map", f"{robot}/alignment/m/a", "mapweave/@v1/{team}/agent/M !/map"):
+            mallory.put(key.format(team=network.team), payload)
+    with (
+        mallory.liveliness().declare_token(f"mapweave/@v1/{network.team}/@live/M !/x"),
+        network.robot("a") as a,
+    ):
+        a.publish_map(make_map("a"))
+        assert network.groups(watcher.next()) == [["a/0"]]
+    server.wait_for_log(f"{robot}/map: ignored")
+    server.wait_for_log(f"{robot}/alignment/m/a: ignored")
+    assert server.stop() == 0
+    assert "messages were not valid and dropped" in server.log
+    assert "Traceback" not in server.log
