@@ -1,5 +1,6 @@
 """How two robots' maps lie to each other, as a message."""
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import ClassVar, Self
 
@@ -59,7 +60,7 @@ class WireAlignment(WireModel):
 
     @classmethod
     def pack(cls, alignment: Alignment) -> Self:
-        """Return `alignment` for the wire."""
+        """Return `alignment` for the wire; what could not be measured is left out."""
         return cls(
             reference=alignment.reference,
             other=alignment.other,
@@ -67,7 +68,7 @@ class WireAlignment(WireModel):
             decision=alignment.decision,
             confidence=float(alignment.confidence),
             reason=alignment.reason,
-            evidence={name: float(number) for name, number in alignment.evidence.items()},
+            evidence=_measured(alignment.evidence),
             runner_up=_pack_runner_up(alignment.runner_up),
         )
 
@@ -85,15 +86,19 @@ class WireAlignment(WireModel):
         )
 
 
+def _measured(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return the finite ones of `numbers`: the others, such as the residual of nothing, say none."""
+    return {name: float(number) for name, number in numbers.items() if math.isfinite(number)}
+
+
 def _pack_runner_up(runner_up: Mapping[str, object] | None) -> RunnerUp | None:
     if runner_up is None:
         return None
     # Its transform has three numbers, everything else in it is one number.
     arrays = {name: np.asarray(value, dtype=float) for name, value in runner_up.items()}
     transform = to_transform(arrays.pop("transform"))
-    return RunnerUp(
-        transform=transform, numbers={name: float(array) for name, array in arrays.items()}
-    )
+    numbers = _measured({name: float(array) for name, array in arrays.items()})
+    return RunnerUp(transform=transform, numbers=numbers)
 
 
 def _unpack_runner_up(runner_up: RunnerUp | None) -> dict[str, object] | None:

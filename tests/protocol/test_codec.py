@@ -1,5 +1,6 @@
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 
 import msgpack
 import numpy as np
@@ -159,6 +160,17 @@ def test_an_alignment_arrives_as_it_was_sent() -> None:
     assert (arrived.reference, arrived.other) == ("a/0", "b/12")
     assert (arrived.decision, arrived.confidence) == ("refused", 0.125)
     assert arrived.runner_up == ALIGNMENT.runner_up
+
+
+def test_what_could_not_be_measured_is_left_out() -> None:
+    numbers = {"common": 2.0, "residual": np.inf, "overlap": np.nan}
+    rival = {"transform": [0.0, 0.0, 0.0], **numbers}
+    poor = replace(ALIGNMENT, evidence=numbers, runner_up=rival)
+    versions = [MapVersion(robot=robot, boot="x", version=3) for robot in "ab"]
+    sent = AlignmentMessage.pack("a", versions[0], versions[1], [poor])
+    (arrived,) = decode(AlignmentMessage, encode(sent)).unpack()
+    assert arrived.evidence == {"common": 2.0}
+    assert arrived.runner_up == {"transform": [0.0, 0.0, 0.0], "common": 2.0}
 
 
 def test_a_status_arrives_as_it_was_sent() -> None:
