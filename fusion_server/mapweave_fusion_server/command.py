@@ -2,11 +2,8 @@
 
 import argparse
 import logging
-import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 
 from mapweave.cli import Command
 from mapweave_fusion_server.coordinator import CoordinatorParameters
@@ -14,6 +11,7 @@ from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.session import open_session
+from mapweave_protocol.stopping import stop_on_signal
 
 DEFAULT_INTERVAL: float = CoordinatorParameters().min_interval
 
@@ -53,22 +51,8 @@ def _run(options: argparse.Namespace) -> int:
         Store(path, team) as store,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        Service(session, team, store, parameters).run(_stop_on_signal())
+        Service(session, team, store, parameters).run(stop_on_signal())
     return 0
-
-
-def _stop_on_signal() -> Callable[[], bool]:
-    """Return what tells whether a signal to stop has come; the second one ends the process."""
-    came: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
-        for stopping in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(stopping, signal.SIG_DFL)
-
-    for stopping in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(stopping, note)
-    return lambda: bool(came)
 
 
 def _seconds(text: str) -> float:

@@ -171,3 +171,5 @@ class Service:
                 query.reply(key, payload)
         except MapweaveError as error:
             query.reply_err(str(error))
+        except zenoh.ZError as error:
+            _log.warning("an answer could not be sent: %s", error)
