@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from mapweave_protocol.stopping import stop_on_signal
 from rich.console import Console
 from rich.text import Text
 
@@ -19,8 +20,10 @@ from mapweave_deploy.crew import Crew
 from mapweave_deploy.display import make_display
 from mapweave_deploy.launcher import Outcome, Plan, free_endpoint, run_team, start_server
 from mapweave_deploy.options import check_source, configure
-from mapweave_deploy.report import tell_files, tell_outcome
+from mapweave_deploy.report import tell_files, tell_outcome, tell_verdicts
 from mapweave_deploy.roster import Member, simulated_team, team_from_logs
+
+NAP = 0.2  # [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,7 @@ class Folder:
         return self.path / "scans"
 
     def create(self) -> None:
-        """Make the folders.
+        """Make the folders; what processes of an earlier team wrote goes.
 
         Raises
         ------
@@ -64,6 +67,8 @@ class Folder:
         """
         try:
             self.logs.mkdir(parents=True, exist_ok=True)
+            for log in self.logs.glob("*.log"):
+                log.unlink()
         except OSError as error:
             raise FileError(self.path, f"cannot be made a folder ({error.strerror})") from error
 
@@ -85,9 +90,11 @@ def run(options: argparse.Namespace) -> int:
             outcome = run_team(crew, plan, display)
         store = _keep_store(plan.store, options.store or folder.store)
         _write(outcome, folder)
-        _say(console, tell_outcome(outcome, plan.members, simulated=options.world is not None))
+        _say(console, tell_outcome(outcome, plan.members))
         files = [("picture", folder.picture), ("joint map", folder.joint), ("store", store)]
         _say(console, tell_files([*files, ("what each process said", folder.logs)]))
+        simulated = options.world is not None
+        _say(console, tell_verdicts(outcome, plan.members, simulated=simulated))
         if options.stay:
             _stay(crew, plan, store, console)
     return 0
@@ -140,11 +147,12 @@ def _how_to_watch(plan: Plan) -> str:
 
 def _stay(crew: Crew, plan: Plan, store: Path, console: Console) -> None:
     """Serve what was stored until Ctrl-C, which is the way to end this."""
+    stopping = stop_on_signal()
     start_server(crew, plan, store)
     _say(console, ["Router and coordinator stay; Ctrl-C ends them."])
-    while True:
+    while not stopping():
         crew.check()
-        time.sleep(1.0)
+        time.sleep(NAP)
 
 
 def _say(console: Console, lines: Iterable[str]) -> None:

@@ -80,7 +80,7 @@ class Crew:
         """
         log = self._logs / f"{name.replace(' ', '-')}.log"
         leash = [sys.executable, "-m", "mapweave_deploy.leash", str(os.getpid())]
-        with log.open("wb") as output:
+        with log.open("ab") as output:
             process = subprocess.Popen(
                 [*leash, *arguments],
                 stdin=subprocess.DEVNULL,

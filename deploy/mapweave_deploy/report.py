@@ -12,22 +12,19 @@ from mapweave_deploy.roster import Member
 from mapweave_deploy.verdict import Limits, Verdict, judge
 
 WORLD_LIMITS = Limits(0.3, np.radians(3.0))
-LOG_LIMITS = Limits(0.5, np.radians(5.0))  # poses in logs come from other programs
+LOG_LIMITS = Limits(0.5, np.radians(5.0))
+SIMULATED = "the simulated truth"
+LOGGED = "the poses in the log (as good as the program that wrote them)"
 
 
-def tell_outcome(outcome: Outcome, members: Sequence[Member], *, simulated: bool) -> Iterator[str]:
-    """Yield what happened: who joined whom, what was refused, what is right, what was sent."""
+def tell_outcome(outcome: Outcome, members: Sequence[Member]) -> Iterator[str]:
+    """Yield what happened: who joined whom, what was not joined and why, what was sent."""
     yield ""
     yield from _tell_robots(outcome, members)
     yield from _tell_alignments(outcome.joint.alignments)
     yield f"Joint map, version {outcome.joint.version}:"
     for component in outcome.joint.components:
         yield f"  {_tell_component(component)}"
-    limits = WORLD_LIMITS if simulated else LOG_LIMITS
-    verdicts = list(judge(outcome.joint, outcome.maps, members, limits))
-    yield from _tell_verdicts(verdicts, limits, "simulated truth" if simulated else "log's poses")
-    if not simulated and verdicts:
-        yield "  (which are worth as much as the program that wrote them)"
     yield from _tell_traffic(outcome, members)
 
 
@@ -76,14 +73,20 @@ def _tell_component(component: JointComponent) -> str:
     return f"{names}, confidence {component.confidence:.2f}, {segments}"
 
 
-def _tell_verdicts(verdicts: Sequence[Verdict], limits: Limits, truth: str) -> Iterator[str]:
-    if not verdicts:
-        return
-    right = sum(verdict.right for verdict in verdicts)
-    bounds = f"{limits.distance:g} m and {np.degrees(limits.angle):g}°"
-    yield f"Right within {bounds} of the {truth}: {right} of {len(verdicts)} joined pairs"
+def tell_verdicts(outcome: Outcome, members: Sequence[Member], *, simulated: bool) -> Iterator[str]:
+    """Yield how many components there are, and whether what was joined is right."""
+    limits = WORLD_LIMITS if simulated else LOG_LIMITS
+    verdicts = list(judge(outcome.joint, outcome.maps, members, limits))
+    count = len(outcome.joint.components)
+    yield f"{len(members)} robots in {count} component{'' if count == 1 else 's'}."
     for verdict in verdicts:
         yield f"  {verdict.reference} and {verdict.other}: {_tell_error(verdict)}"
+    if verdicts:
+        right = sum(verdict.right for verdict in verdicts)
+        yield (
+            f"{right} of {len(verdicts)} joined pairs are right within {limits.distance:g} m and"
+            f" {np.degrees(limits.angle):g}° of {SIMULATED if simulated else LOGGED}."
+        )
 
 
 def _tell_error(verdict: Verdict) -> str:
