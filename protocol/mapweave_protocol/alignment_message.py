@@ -87,7 +87,7 @@ class WireAlignment(WireModel):
 
 
 def _measured(numbers: Mapping[str, float]) -> dict[str, float]:
-    """Return the finite ones of `numbers`: the others, such as the residual of nothing, say none."""
+    """Return the finite ones of `numbers`; the residual of nothing, say, is none."""
     return {name: float(number) for name, number in numbers.items() if math.isfinite(number)}
 
 
