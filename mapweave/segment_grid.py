@@ -20,10 +20,11 @@ class SegmentGrid:
     """
 
     def __init__(self, reach: float) -> None:
-        # Points of a segment are taken every 2 * reach at most, so that two segments in reach
-        # have two such points at most 3 * reach apart: in the same or in adjoining cells.
+        # Points of a segment are taken every 2 * reach at most, its ends included. Where two
+        # segments come closest one of them ends, unless they cross: either way both have such
+        # a point within 2 * reach of the other's, so in the same or in adjoining cells.
         self._spacing = 2 * reach
-        self._cell = 3 * reach
+        self._cell = 2 * reach
         self._passing: dict[int, set[int]] = {}
         self._cells: dict[int, set[int]] = {}
 

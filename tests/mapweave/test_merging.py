@@ -220,6 +220,12 @@ def test_a_scan_joins_two_parts_of_a_wall() -> None:
     assert evolution.labels.tolist() == [0, 0, 0]
 
 
+def test_pieces_of_a_new_wall_in_one_scan_are_merged() -> None:
+    scan = np.array([[0, 9, 2, 9], [2, 9.01, 4, 9.01]])
+    evolution = merge_scan(ROOM, lengths_of(ROOM), scan)
+    assert len(evolution.segments) == len(ROOM) + 1
+
+
 def test_the_first_scan_is_the_first_map() -> None:
     """G_1 is S_1 (paper, V)."""
     evolution = merge_scan(np.empty((0, 4)), np.empty(0), ROOM)

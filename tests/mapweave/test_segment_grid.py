@@ -2,27 +2,34 @@
 
 import numpy as np
 import pytest
+import shapely
 
-from mapweave.arrays import FloatArray
-from mapweave.merging_cost import Pairs, proximity
 from mapweave.segment_grid import SegmentGrid
-
-
-def some_segments(seed: int) -> FloatArray:
-    random = np.random.default_rng(seed)
-    start = random.uniform(-5, 5, (150, 2))
-    return np.hstack([start, start + random.normal(0, 1, (150, 2))])
 
 
 @pytest.mark.parametrize("reach", [0.1, 0.3, 1.0])
 def test_no_segment_in_reach_is_missed(reach: float) -> None:
-    segments = some_segments(1)
+    random = np.random.default_rng(1)
+    start = random.uniform(-9, 9, (800, 2))
+    segments = np.hstack([start, start + random.normal(0, 2 * reach, (800, 2))])
+    lines = shapely.linestrings(segments.reshape(-1, 2, 2))
     grid = SegmentGrid(reach)
     for number, segment in enumerate(segments):
         grid.add(number, segment)
-    for segment in segments:
-        apart = proximity(Pairs.of(segment[None], segments))
-        assert set(np.flatnonzero(apart <= reach)) <= set(grid.near(segment).tolist())
+    for segment, line in zip(segments, lines, strict=True):
+        in_reach = np.flatnonzero(shapely.distance(line, lines) <= reach)
+        assert set(in_reach.tolist()) <= set(grid.near(segment).tolist())
+
+
+def test_an_end_half_way_between_the_points_of_a_segment_is_found_wherever_they_lie() -> None:
+    """The worst case: no end of the one is near an end of the other."""
+    diagonal = np.array([0, 0, 1, 1]) * np.sqrt(2)
+    beside = np.array([1, 0, 3, -1]) * np.sqrt(2)
+    for place in np.random.default_rng(2).uniform(-4, 4, (200, 2)):
+        shift = np.tile(place, 2)
+        grid = SegmentGrid(reach=1.001)
+        grid.add(0, diagonal + shift)
+        assert grid.near(beside + shift).tolist() == [0]
 
 
 def test_far_segments_are_left_out() -> None:
