@@ -117,7 +117,7 @@ class Agent:
         self._publish_map(complete=True)
         self._publish_status()
         _log.info(
-            "mapped %d of %d scans into %d submaps",
+            "finished: %d of %d scans placed, submaps: %d",
             _scans_placed(self._published),
             self._scans_seen,
             len(self._published.submaps),
