@@ -1,0 +1,177 @@
+"""One robot: every log mapped without odometry, one table (issue of the single-robot map)."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mapweave.arrays import FloatArray
+from mapweave.assembly import assemble
+from mapweave.files import write_map
+from mapweave.joint import build_joint_map
+from mapweave.maps import RobotMap, component_name
+from mapweave.picture import draw_map
+from mapweave.scan import Scan
+from tests.benchmarks.coverage import explained_share, returns_at
+from tests.benchmarks.logs import Log, find_logs, load_scans, load_truth
+from tests.benchmarks.runs import Run, map_scans
+from tests.benchmarks.tables import OUTPUT, format_table, write_json
+from tests.benchmarks.truth import (
+    Path2D,
+    RelationError,
+    paths,
+    position_error,
+    relation_error,
+    steps_right,
+)
+
+COMPARISON = """\
+For comparison, mean relation errors of others, on all relations and with their odometry
+(Kümmerle et al. 2009; Hess et al. 2016), and of the log's own corrected poses on the joined ones:
+  fr079      Cartographer 0.045 m 0.54°, graph mapping 0.056 m, scan matching 0.258 m; own 0.051 m
+  intel-lab  Cartographer 0.023 m 0.45°, graph mapping 0.031 m, scan matching 0.220 m; own 0.043 m
+  killian    graph mapping 0.050 m, scan matching 1.651 m; own 0.039 m"""
+HEAD = ["log", "scans", "placed", "largest", "comp.", "steps right", "ATE m", "explained"]
+HEAD += ["segments", "file kB", "ms/scan", "real time"]
+RELATION_HEAD = ["log", "joined", "used", "mean m", "sd m", "mean °", "sd °"]
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What one log came to.
+
+    Attributes
+    ----------
+    placed, largest
+        Scans in some component, and in the largest.
+    steps, steps_right
+        Steps within one component whose truth is known, and those right.
+    position_error
+        [m] rms of the largest component, moved rigidly.
+    explained
+        Share of the returns under 12 m of the largest component within 10 cm of its lines.
+    segments, size
+        Of the largest component, merged; and the whole MAP.json [bytes].
+    scan_time
+        [s] per scan, on a machine that may have been busy.
+    duration
+        [s] of the recording.
+    """
+
+    log: str
+    scans: int
+    placed: int
+    largest: int
+    components: int
+    steps: int
+    steps_right: int
+    position_error: float
+    explained: float
+    segments: int
+    size: int
+    scan_time: float
+    duration: float
+    relations: RelationError | None
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say which logs, and where results go."""
+    parser.add_argument("--logs", nargs="+", metavar="NAME", help="which logs (default all)")
+    parser.add_argument("--output", type=Path, default=OUTPUT / "map", help="folder (%(default)s)")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Map the logs, print the tables, write the maps, their pictures and the figures."""
+    figures = []
+    for log in find_logs(options.logs):
+        figures.append(_measure(log, options.output))
+        write_json(options.output / "figures.json", [asdict(f) for f in figures])
+    print(tell(figures))
+    print(f"Pictures, maps and figures.json are in {options.output}")
+
+
+def _measure(log: Log, folder: Path) -> Figures:
+    scans = load_scans(log)
+    made = map_scans(log.name, scans)
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"{log.name}.json"
+    write_map(file, made.robot_map)
+    draw_map(made.robot_map, folder / f"{log.name}.png", title=f"{log.name}, without odometry")
+    return _figures(log, scans, made, file.stat().st_size)
+
+
+def _figures(log: Log, scans: Sequence[Scan], made: Run, size: int) -> Figures:
+    stamps = np.array([scan.stamp for scan in scans])
+    truth = load_truth(log, stamps)
+    found = paths(made.robot_map)
+    lines = merged_segments(made.robot_map, found[0].component)
+    right = steps_right(found, truth)
+    return Figures(
+        log=log.name,
+        scans=len(scans),
+        placed=sum(len(path.index) for path in found),
+        largest=len(found[0].index),
+        components=len(found),
+        steps=len(right),
+        steps_right=int(right.sum()),
+        position_error=position_error(found[0], truth),
+        explained=_explained(found[0], scans, lines),
+        segments=len(lines),
+        size=size,
+        scan_time=made.seconds / len(scans),
+        duration=float(np.ptp(stamps)),
+        relations=relation_error(log.relations, stamps, found) if log.relations else None,
+    )
+
+
+def merged_segments(robot_map: RobotMap, component: int) -> FloatArray:
+    """Return the (n, 4) segments [m] of a component, its submaps merged into one map."""
+    name = component_name(robot_map.robot, component)
+    joint = build_joint_map({name: assemble(robot_map, component)}, [], version=1)
+    return joint.components[0].map.segments
+
+
+def _explained(path: Path2D, scans: Sequence[Scan], segments: FloatArray) -> float:
+    points = returns_at([scans[k] for k in path.index], path.pose)
+    return explained_share(points, segments)
+
+
+def tell(figures: Sequence[Figures]) -> str:
+    """Return the tables as text."""
+    related = [_relation_row(f.log, f.relations) for f in figures if f.relations]
+    parts = [format_table(HEAD, [_row(f) for f in figures])]
+    if related:
+        parts += ["\nGround-truth relations that join the log by timestamp:"]
+        parts += [format_table(RELATION_HEAD, related), COMPARISON]
+    return "\n".join(parts)
+
+
+def _row(f: Figures) -> list[str]:
+    return [
+        f.log,
+        str(f.scans),
+        f"{f.placed / f.scans:.1%}",
+        f"{f.largest / f.scans:.1%}",
+        str(f.components),
+        f"{f.steps_right / max(f.steps, 1):.2%} of {f.steps}",
+        f"{f.position_error:.3f}",
+        f"{f.explained:.1%}",
+        str(f.segments),
+        f"{f.size / 1000:.0f}",
+        f"{1000 * f.scan_time:.1f}",
+        f"{f.duration / (f.scan_time * f.scans):.0f}x",
+    ]
+
+
+def _relation_row(log: str, error: RelationError) -> list[str]:
+    return [
+        log,
+        str(error.joined),
+        str(error.used),
+        f"{error.translation:.3f}",
+        f"{error.translation_sd:.3f}",
+        f"{np.degrees(error.rotation):.2f}",
+        f"{np.degrees(error.rotation_sd):.2f}",
+    ]
