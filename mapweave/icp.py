@@ -150,9 +150,8 @@ def _linearise(
     distance, index = partners(placed, target, parameters, 3 * scale)
     paired = np.isfinite(distance)
     if corresponding is not None:
-        paired[paired] = corresponding[
-            target.surface.polyline[index[paired]], moving.polyline[paired]
-        ]
+        theirs, ours = target.surface.polyline[index[paired]], moving.polyline[paired]
+        paired[paired] = corresponding[theirs, ours] & (theirs >= 0) & (ours >= 0)
     points, index = placed.points[paired], index[paired]
     normals = target.surface.normals[index]
     residual = np.einsum("ij,ij->i", normals, points - target.surface.points[index])

@@ -1,0 +1,105 @@
+"""Oriented points: on what was seen, with normals towards the side it was seen from."""
+
+import numpy as np
+from numpy.random import Generator
+
+from mapweave import se2
+from mapweave.observation import ObservationParameters, observe
+from mapweave.segments import extract_segments
+from mapweave.surface import join_surfaces, left_normals, line_surface, scan_surface
+from tests.mapweave.buildings import (
+    AROUND,
+    BUILDING,
+    cast,
+    line_map,
+    random_pose,
+    rectangle,
+    walls_of,
+)
+
+ROOM = walls_of(rectangle(0, 0, 6, 4))
+
+
+def test_the_visible_side_is_on_the_left() -> None:
+    np.testing.assert_allclose(
+        left_normals(np.array([[2.0, 0], [0, 3], [-1, 0]])), [[0, 1], [-1, 0], [0, -1]]
+    )
+
+
+def test_all_normals_of_a_scan_face_the_sensor(rng: Generator) -> None:
+    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND, noise=rng)
+    seen = observe(scan, ObservationParameters()).surface
+    towards = -np.einsum("ij,ij->i", seen.points, seen.normals)
+    assert len(seen) > 300
+    # A stray pair of returns at a corner may err; surfaces may not.
+    assert (towards > 0).mean() > 0.99
+    np.testing.assert_allclose(np.hypot(*seen.normals.T), 1)
+
+
+def test_the_normals_of_a_scan_are_those_of_the_walls(rng: Generator) -> None:
+    """Of a room along the axes: one component is 1, the other 0, wherever the sensor looks."""
+    pose = np.array([2.0, 1.5, 0.7])
+    seen = observe(cast(ROOM, pose, angles=AROUND, noise=rng), ObservationParameters()).surface
+    normals = seen.moved(pose).normals
+    assert (np.abs(normals).max(axis=1) > 0.99).mean() > 0.95
+
+
+def test_every_return_up_to_the_range_becomes_a_point_and_no_other(rng: Generator) -> None:
+    scan = cast(walls_of(BUILDING), [9, 1, 0.3], noise=rng)
+    segments = extract_segments(scan)
+    polyline = np.zeros(len(segments.segments), dtype=np.int64)
+    seen = scan_surface(scan, segments, polyline, 6.0)
+    assert np.hypot(*seen.points.T).max() <= 6.0
+    near = (scan.ranges <= 6.0) & (segments.label >= 0)
+    assert len(seen) >= near.sum()
+    assert (seen.polyline >= 0).sum() == near.sum()
+
+
+def test_the_lines_of_an_observation_are_the_scans_segments_by_polyline(rng: Generator) -> None:
+    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND, noise=rng)
+    seen = observe(scan, ObservationParameters())
+    found = extract_segments(scan).segments
+    np.testing.assert_array_equal(np.unique(seen.lines.segments, axis=0), np.unique(found, axis=0))
+    assert set(np.diff(seen.lines.polyline)) <= {0, 1}
+    assert (seen.lines.support == 1).all()
+
+
+def test_a_points_polyline_is_that_of_the_line_it_lies_on(rng: Generator) -> None:
+    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND, noise=rng)
+    seen = observe(scan, ObservationParameters())
+    lines = seen.lines
+    for polyline in np.unique(lines.polyline):
+        points = seen.surface.points[seen.surface.polyline == polyline]
+        own = lines.segments[lines.polyline == polyline]
+        normals = left_normals(own[:, 2:] - own[:, :2])
+        across = np.abs(np.einsum("psj,sj->ps", points[:, None] - own[None, :, :2], normals))
+        assert (across.min(axis=1) < 0.15).all()
+
+
+def test_a_line_is_sampled_evenly_and_even_a_short_one_once() -> None:
+    lines = line_map(np.array([[0.0, 0, 2, 0], [5, 5, 5, 5.01]]))
+    surface, owner = line_surface(lines, 0.5)
+    np.testing.assert_allclose(surface.points[:4], [[0.25, 0], [0.75, 0], [1.25, 0], [1.75, 0]])
+    assert owner.tolist() == [0, 0, 0, 0, 1]
+    np.testing.assert_allclose(surface.normals[0], [0, 1])
+
+
+def test_sampling_and_moving_may_be_exchanged(rng: Generator) -> None:
+    pose, lines = random_pose(rng), line_map(walls_of(BUILDING))
+    moved = line_map(se2.transform_segments(pose, lines.segments))
+    first, second = line_surface(lines, 0.17)[0].moved(pose), line_surface(moved, 0.17)[0]
+    np.testing.assert_allclose(first.points, second.points, atol=1e-9)
+    np.testing.assert_allclose(first.normals, second.normals, atol=1e-9)
+
+
+def test_joined_surfaces_keep_all_their_points() -> None:
+    one, _ = line_surface(line_map(ROOM), 0.5)
+    both = join_surfaces([one, one.at(slice(0, 3))])
+    assert len(both) == len(one) + 3
+    np.testing.assert_array_equal(both.normals[-3:], one.normals[:3])
+
+
+def test_a_scan_that_shows_nothing_has_no_surface() -> None:
+    blind = cast(ROOM, [1, 2, 0], max_range=0.5)
+    seen = observe(blind, ObservationParameters())
+    assert len(seen.surface) == 0 and len(seen.lines.segments) == 0
