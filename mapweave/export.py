@@ -8,7 +8,7 @@ from mapweave.files import replace_file
 from mapweave.geojson import feature_collection
 from mapweave.maps import JointMap, RobotMap
 from mapweave.picture import PICTURE_SUFFIXES, draw_joint, draw_map
-from mapweave.scene import joint_scenes, robot_scenes
+from mapweave.scene import Scene, joint_scenes, robot_scenes
 
 EXPORT_SUFFIXES = (*PICTURE_SUFFIXES, ".geojson")
 PLANNED_SUFFIXES = (".dxf", ".yaml")
@@ -58,8 +58,10 @@ def _draw(some_map: RobotMap | JointMap, path: Path) -> None:
 
 
 def _write_geojson(some_map: RobotMap | JointMap, path: Path) -> None:
-    joint = isinstance(some_map, JointMap)
-    scenes = joint_scenes(some_map) if joint else robot_scenes(some_map)
-    text = json.dumps(feature_collection(scenes), allow_nan=False, separators=(",", ":"))
+    text = json.dumps(feature_collection(_scenes(some_map)), allow_nan=False, separators=(",", ":"))
     with replace_file(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _scenes(some_map: RobotMap | JointMap) -> list[Scene]:
+    return robot_scenes(some_map) if isinstance(some_map, RobotMap) else joint_scenes(some_map)

@@ -28,7 +28,7 @@ class FreeSpaceParameters(BaseModel):
     )
     margin: float = Field(0.15, ge=0, description="[m] kept from what the beams hit")
     simplification: float = Field(
-        0.06, gt=0, description="[m] by which outlines may deviate; below the margin"
+        0.1, gt=0, description="[m] by which outlines may deviate; below the margin"
     )
     min_area: float = Field(0.1, ge=0, description="[m²] smaller pieces are not worth sending")
 

@@ -55,9 +55,23 @@ class FusionParameters(BaseModel):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """An aligned hypothesis with its verdict and the complexity [rad²] of what is shared (V2)."""
+    """An aligned hypothesis with its verdict.
+
+    Attributes
+    ----------
+    transform
+        (3,) from the other map to the reference [m, m, rad].
+    place
+        (2,) where it takes the middle of the other map's wall [m]: what tells hypotheses apart,
+        because it depends on no frame.
+    verdict
+        What both maps say of it.
+    complexity
+        [rad²] of what is shared (V2).
+    """
 
     transform: FloatArray
+    place: FloatArray
     verdict: Verdict
     complexity: float
 
@@ -67,12 +81,8 @@ def align_robots(
 ) -> list[Alignment]:
     """Compare every component of `reference` with every one of `other`."""
     p = parameters or FusionParameters()
-    ours = {
-        component_name(reference.robot, c): assemble(reference, c) for c in reference.components
-    }
-    theirs = {component_name(other.robot, c): assemble(other, c) for c in other.components}
-    shapes = {name: _shape(lines, p) for name, lines in {**ours, **theirs}.items()}
-    return [_compare(a, shapes[a], b, shapes[b], p) for a in ours for b in theirs]
+    ours, theirs = _shapes(reference, p), _shapes(other, p)
+    return [_compare(a, ours[a], b, theirs[b], p) for a in ours for b in theirs]
 
 
 def align_maps(
@@ -139,10 +149,19 @@ def find_alignments(first: Shape, second: Shape, p: FusionParameters) -> list[Hy
     fine = [
         _refine(second, target, aligned[k], p.fine_icp, len(second.raster.weight)) for k in leaders
     ]
-    found = [
-        Hypothesis(t, _verdict(first, second, t, p), _complexity(first, second, t, p)) for t in fine
-    ]
+    found = [_judged(first, second, t, middle, p) for t in fine]
     return sorted(found, key=lambda h: -h.verdict.score)
+
+
+def _judged(
+    first: Shape, second: Shape, transform: FloatArray, middle: FloatArray, p: FusionParameters
+) -> Hypothesis:
+    return Hypothesis(
+        transform,
+        se2.transform_points(transform, middle),
+        _verdict(first, second, transform, p),
+        _complexity(first, second, transform, p),
+    )
 
 
 def decide(best: Hypothesis, rival: Hypothesis | None, p: FusionParameters) -> tuple[Decision, str]:
@@ -163,7 +182,7 @@ def decide(best: Hypothesis, rival: Hypothesis | None, p: FusionParameters) -> t
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
     if rival is None:
         return "accepted", f"{found}; nothing else fits"
-    elsewhere = _difference(best.transform, rival.transform)
+    elsewhere = _elsewhere(best, rival)
     if rival.verdict.score > p.max_rival * v.score:
         return "ambiguous", f"{found}; but {elsewhere} explains {rival.verdict.score:.0f} m as well"
     return "accepted", f"{found}; next best, {elsewhere}, explains {_explains(rival.verdict)}"
@@ -173,12 +192,18 @@ def _explains(verdict: Verdict) -> str:
     return f"{verdict.score:.0f} m" if verdict.score >= 1 else "nothing"
 
 
-def _difference(best: FloatArray, rival: FloatArray) -> str:
+def _elsewhere(best: Hypothesis, rival: Hypothesis) -> str:
     """How the rival differs, in words."""
-    x, y, turn = se2.between(best, rival)
-    distance = f"{np.hypot(x, y):.0f} m away"
-    degrees = abs(np.degrees(turn))
-    return distance if degrees < 9 else f"{distance} and turned by {degrees:.0f}°"
+    distance, turn = _difference(best, rival)
+    away, degrees = f"{distance:.0f} m away", np.degrees(turn)
+    return away if degrees < 9 else f"{away} and turned by {degrees:.0f}°"
+
+
+def _difference(best: Hypothesis, rival: Hypothesis) -> tuple[float, float]:
+    """How far apart two hypotheses put the other map [m], and how differently turned [rad]."""
+    x, y = rival.place - best.place
+    turn = se2.wrap(rival.transform[2] - best.transform[2])
+    return float(np.hypot(x, y)), float(abs(turn))
 
 
 def _refine(
@@ -206,11 +231,11 @@ def _numbers(hypothesis: Hypothesis) -> dict[str, float]:
 
 
 def _runner_up(best: Hypothesis, rival: Hypothesis) -> dict[str, object]:
-    x, y, turn = se2.between(best.transform, rival.transform)
+    distance, turn = _difference(best, rival)
     return {
         "transform": [float(v) for v in rival.transform],
-        "distance": float(np.hypot(x, y)),
-        "turn": float(abs(turn)),
+        "distance": distance,
+        "turn": turn,
         **_numbers(rival),
     }
 

@@ -25,7 +25,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mapweave.arrays import FloatArray
+from mapweave.arrays import FloatArray, IntArray
 from mapweave.scene import Scene, ScenePath, robot_of
 
 Json: TypeAlias = dict[str, Any]
@@ -80,7 +80,7 @@ def _polylines(scene: Scene) -> list[Json]:
     return [_polyline(scene, of_one) for of_one in numbers if len(of_one)]
 
 
-def _polyline(scene: Scene, numbers: np.ndarray[Any, np.dtype[np.int64]]) -> Json:
+def _polyline(scene: Scene, numbers: IntArray) -> Json:
     support = scene.map.support[numbers]
     properties: Json = {"support": support.tolist(), "support_max": int(support.max())}
     if scene.segment_confidence is not None:

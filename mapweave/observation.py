@@ -20,7 +20,10 @@ class ObservationParameters(BaseModel):
     segments: SegmentParameters = SegmentParameters()
     max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
     sight: float = Field(
-        14.0, gt=0, description="[m] returns up to here are aligned; farther ones are too sparse"
+        25.0,
+        gt=0,
+        description="[m] returns up to here are aligned: the end of a corridor is all"
+        " that tells how far along it a robot is",
     )
 
 

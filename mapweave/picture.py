@@ -10,7 +10,7 @@ from types import ModuleType
 from mapweave.errors import FileError, MissingExtraError
 from mapweave.files import replace_file
 from mapweave.maps import JointMap, RobotMap
-from mapweave.scene import Scene, joint_scenes, robot_scenes
+from mapweave.scene import Scene, joint_scenes, robot_of, robot_scenes, tell_confidence
 
 PICTURE_SUFFIXES = (".svg", ".png")
 
@@ -68,10 +68,10 @@ def draw_joint(
         If matplotlib is not installed.
     """
     scenes = joint_scenes(joint, maps)
-    robots = {name.partition("/")[0] for scene in scenes for name in scene.robots}
+    robots = {robot_of(name) for scene in scenes for name in scene.robots}
     facts = [_count(len(robots), "robot"), *_facts(scenes)]
     if len(scenes) == 1:
-        facts.append(f"confidence {joint.components[0].confidence:.0%}")
+        facts += tell_confidence(scenes[0])
     _draw(scenes, Path(path), title or f"Joint map, version {joint.version}", facts)
 
 
@@ -97,18 +97,18 @@ def _count(number: int, thing: str) -> str:
 
 def _draw(scenes: Sequence[Scene], path: Path, title: str, facts: Sequence[str]) -> None:
     check_picture_suffix(path)
-    drawing = _drawing()
-    figure = drawing.draw(scenes, title, " · ".join(facts))
+    figure = _figure_module()
+    drawn = figure.draw(scenes, title, " · ".join(facts))
     with replace_file(path) as temporary:
-        drawing.save(figure, temporary, path.suffix.lower()[1:])
+        figure.save(drawn, temporary, path.suffix.lower()[1:])
 
 
-def _drawing() -> ModuleType:
-    """Return `mapweave.drawing`, which needs matplotlib."""
+def _figure_module() -> ModuleType:
+    """Return `mapweave.figure`, which needs matplotlib."""
     try:
-        from mapweave import drawing
+        from mapweave import figure
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
             raise
         raise MissingExtraError("a picture", "plot") from error
-    return drawing
+    return figure

@@ -8,6 +8,7 @@ import numpy as np
 
 from mapweave import se2
 from mapweave.arrays import FloatArray, IntArray
+from mapweave.assembly import assemble
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, component_name
 
 
@@ -70,6 +71,15 @@ def robot_of(component: str) -> str:
     return component.partition("/")[0]
 
 
+def tell_confidence(scene: Scene) -> list[str]:
+    """Return the confidence in words; nothing where no two robots had to be joined."""
+    if scene.confidence is None or len(scene.robots) < 2:
+        return []
+    # Rounded, 0.996 would read as certain.
+    sure = scene.confidence >= 0.995
+    return [f"confidence {'over 99%' if sure else f'{scene.confidence:.0%}'}"]
+
+
 def robot_scenes(robot_map: RobotMap) -> list[Scene]:
     """Return one scene for each of the robot's components, in ascending order."""
     return [_robot_scene(robot_map, component) for component in robot_map.components]
@@ -93,35 +103,6 @@ def joint_scenes(joint: JointMap, maps: Mapping[str, RobotMap] | None = None) ->
     return [_joint_scene(component, known) for component in joint.components]
 
 
-def place_map(pose: FloatArray, line_map: LineMap) -> LineMap:
-    """Return `line_map`, given in the frame at `pose` (3,), in its parent's."""
-    return LineMap(
-        se2.transform_segments(pose, line_map.segments),
-        line_map.polyline,
-        line_map.support,
-        _place_polygons(pose, line_map.free_space),
-    )
-
-
-def join_maps(maps: Sequence[LineMap]) -> LineMap:
-    """Return the lines and the free space of `maps`, all in one frame, side by side in one map."""
-    if not maps:
-        return LineMap.empty()
-    return LineMap(
-        np.concatenate([part.segments for part in maps]),
-        _renumber([part.polyline for part in maps]),
-        np.concatenate([part.support for part in maps]),
-        tuple(polygon for part in maps for polygon in part.free_space),
-    )
-
-
-def _renumber(numbers: Sequence[IntArray]) -> IntArray:
-    """Return the parts' polyline numbers in one ascending array, none used twice."""
-    counts = [int(part[-1]) + 1 if len(part) else 0 for part in numbers]
-    offsets = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
-    return np.concatenate([part + offset for part, offset in zip(numbers, offsets, strict=True)])
-
-
 def _place_polygons(pose: FloatArray, polygons: Iterable[FloatArray]) -> tuple[FloatArray, ...]:
     return tuple(se2.transform_points(pose, polygon) for polygon in polygons)
 
@@ -129,7 +110,7 @@ def _place_polygons(pose: FloatArray, polygons: Iterable[FloatArray]) -> tuple[F
 def _robot_scene(robot_map: RobotMap, component: int) -> Scene:
     name = component_name(robot_map.robot, component)
     submaps = [submap for submap in robot_map.submaps if submap.component == component]
-    lines = join_maps([place_map(submap.pose, submap.map) for submap in submaps])
+    lines = assemble(robot_map, component)
     paths = tuple(_path(robot_map.robot, name, run) for run in _runs(submaps))
     return Scene(
         name,

@@ -13,6 +13,7 @@ from mapweave.maps import LineMap, Trajectory
 from mapweave.merging import MergingParameters, count_support, merge_scan
 from mapweave.polylines import group_polylines
 from mapweave.scan import Scan
+from mapweave.slivers import absorb_slivers
 
 
 class SubmapParameters(BaseModel):
@@ -99,9 +100,10 @@ class GrowingSubmap:
 
     def lines(self) -> LineMap:
         """Return the lines alone."""
-        order, polyline = group_polylines(self._segments, self._parameters.max_gap)
-        support = count_support(self._sightings.labels, self._sightings.scans)
-        return LineMap(self._segments[order], polyline, support[order])
+        whole = absorb_slivers(self._segments, self._weights)
+        order, polyline = group_polylines(whole.segments, self._parameters.max_gap)
+        support = count_support(whole.labels[self._sightings.labels], self._sightings.scans)
+        return LineMap(whole.segments[order], polyline, support[order])
 
     def _merge(self, scan: int, segments: FloatArray) -> None:
         evolution = merge_scan(self._segments, self._weights, segments, self._parameters.merging)

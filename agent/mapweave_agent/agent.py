@@ -6,11 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import zenoh
-from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
-from mapweave_protocol.inbox import Inbox
-from mapweave_protocol.keys import ALIGNMENT, LIVE, MAP, STATUS
-from mapweave_protocol.messages import AlignmentMessage, MapVersion, StatusMessage
-from mapweave_protocol.session import declare_subscriber
 
 from mapweave.mapper import Mapper
 from mapweave.maps import RobotMap
@@ -21,6 +16,11 @@ from mapweave_agent.outbox import Outbox
 from mapweave_agent.planning import AgentParameters, PublicationPlan
 from mapweave_agent.reception import Reception
 from mapweave_agent.source import Pace
+from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.inbox import Inbox
+from mapweave_protocol.keys import ALIGNMENT, LIVE, MAP, STATUS
+from mapweave_protocol.messages import AlignmentMessage, MapVersion, StatusMessage
+from mapweave_protocol.session import declare_subscriber
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
 MAX_ARRIVALS = 64  # taken in at once, so that a flood does not hold up mapping

@@ -8,11 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from mapweave_protocol.arguments import add_connection_arguments, connection_of
-from mapweave_protocol.keys import new_boot
-from mapweave_protocol.session import open_session
-from mapweave_protocol.stopping import stop_on_signal
-
 from mapweave.cli import Command
 from mapweave.fusion import align_robots
 from mapweave.mapper import Mapper
@@ -21,6 +16,10 @@ from mapweave_agent.agent import Agent
 from mapweave_agent.comparer import Comparer
 from mapweave_agent.planning import AgentParameters
 from mapweave_agent.source import LogSource, Pace, ScanRange, parse_rate
+from mapweave_protocol.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.keys import new_boot
+from mapweave_protocol.session import open_session
+from mapweave_protocol.stopping import stop_on_signal
 
 T = TypeVar("T")
 _log = logging.getLogger(__name__)

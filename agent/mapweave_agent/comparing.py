@@ -3,11 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mapweave_protocol.messages import AlignmentMessage, Compared, MapVersion
-from mapweave_protocol.pairs import ordered, responsible
-
 from mapweave.maps import RobotMap
 from mapweave_agent.planning import AgentParameters
+from mapweave_protocol.messages import AlignmentMessage, Compared, MapVersion
+from mapweave_protocol.pairs import ordered, responsible
 
 
 @dataclass(frozen=True, slots=True)

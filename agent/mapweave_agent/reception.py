@@ -2,6 +2,7 @@
 
 import logging
 
+from mapweave_agent.comparing import ComparisonPlan
 from mapweave_protocol.assembler import MapAssembler
 from mapweave_protocol.inbox import (
     Arrival,
@@ -11,8 +12,6 @@ from mapweave_protocol.inbox import (
     read_presence,
     status_reader,
 )
-
-from mapweave_agent.comparing import ComparisonPlan
 
 _log = logging.getLogger(__name__)
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from mapweave_protocol.stopping import stop_on_signal
 from rich.console import Console
 from rich.text import Text
 
@@ -22,6 +21,7 @@ from mapweave_deploy.launcher import Outcome, Plan, free_endpoint, run_team, sta
 from mapweave_deploy.options import check_source, configure
 from mapweave_deploy.report import tell_files, tell_outcome, tell_verdicts
 from mapweave_deploy.roster import Member, simulated_team, team_from_logs
+from mapweave_protocol.stopping import stop_on_signal
 
 NAP = 0.2  # [s]
 

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Protocol
 
-from mapweave_protocol.messages import StatusMessage
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 from mapweave_deploy.roster import Member
+from mapweave_protocol.messages import StatusMessage
 
 
 class Display(Protocol):

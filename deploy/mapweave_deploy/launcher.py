@@ -6,13 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import zenoh
-from mapweave_fusion_server.store import Store
-from mapweave_protocol.asking import ask_robot_map
-from mapweave_protocol.assembler import MapAssembler
-from mapweave_protocol.codec import decode
-from mapweave_protocol.inbox import Inbox
-from mapweave_protocol.messages import JointMapMessage, MapMessage
-from mapweave_protocol.session import open_session
 
 from mapweave.errors import MapweaveError
 from mapweave.maps import JointMap, RobotMap
@@ -20,6 +13,13 @@ from mapweave_deploy.crew import Crew
 from mapweave_deploy.display import Display
 from mapweave_deploy.recorder import Recorder, is_done
 from mapweave_deploy.roster import Member
+from mapweave_fusion_server.store import Store
+from mapweave_protocol.asking import ask_robot_map
+from mapweave_protocol.assembler import MapAssembler
+from mapweave_protocol.codec import decode
+from mapweave_protocol.inbox import Inbox
+from mapweave_protocol.messages import JointMapMessage, MapMessage
+from mapweave_protocol.session import open_session
 
 ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
 ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things

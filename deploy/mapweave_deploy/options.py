@@ -4,9 +4,8 @@ import argparse
 import math
 from pathlib import Path
 
-from mapweave_protocol.arguments import DEFAULT_TEAM
-
 from mapweave_deploy.simulation import BUILDERS
+from mapweave_protocol.arguments import DEFAULT_TEAM
 
 DEFAULT_ROBOTS = 3
 

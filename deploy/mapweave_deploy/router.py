@@ -6,11 +6,11 @@ import sys
 import time
 
 import zenoh
-from mapweave_protocol.session import router_config
-from mapweave_protocol.stopping import stop_on_signal
 
 from mapweave.cli import Command
 from mapweave.errors import MapweaveError
+from mapweave_protocol.session import router_config
+from mapweave_protocol.stopping import stop_on_signal
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 NAP = 0.2  # [s]

@@ -10,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+
 from mapweave_deploy.simulation import simulate
 
 PATIENCE = 20.0  # [s]

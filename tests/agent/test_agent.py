@@ -10,6 +10,11 @@ from pathlib import Path
 
 import pytest
 import zenoh
+
+from mapweave.cli import EXIT_FAILED, EXIT_USAGE, main
+from mapweave.mapper import Mapper
+from mapweave.maps import RobotMap
+from mapweave.readers import read_scans
 from mapweave_protocol import keys
 from mapweave_protocol.asking import ask_robot_map
 from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE, MapAssembler, MapSender
@@ -23,11 +28,6 @@ from mapweave_protocol.inbox import (
 from mapweave_protocol.messages import AlignmentMessage, StatusMessage
 from mapweave_protocol.pairs import responsible
 from mapweave_protocol.session import declare_map_publisher, declare_subscriber, open_session
-
-from mapweave.cli import EXIT_FAILED, EXIT_USAGE, main
-from mapweave.mapper import Mapper
-from mapweave.maps import RobotMap
-from mapweave.readers import read_scans
 
 MAPWEAVE = Path(sys.executable).with_name("mapweave")
 PATIENCE = 60.0  # [s]

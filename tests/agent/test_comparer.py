@@ -6,11 +6,11 @@ import signal
 import time
 
 import numpy as np
-from mapweave_agent.comparer import Comparer, Outcome
-from mapweave_agent.comparing import Comparison
 
 from mapweave.fusion import align_robots
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
+from mapweave_agent.comparer import Comparer, Outcome
+from mapweave_agent.comparing import Comparison
 
 PATIENCE = 60.0  # [s]
 

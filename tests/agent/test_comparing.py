@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from mapweave.maps import RobotMap
 from mapweave_agent.comparing import Comparison, ComparisonPlan
 from mapweave_agent.planning import AgentParameters, PublicationPlan
 from mapweave_protocol.messages import AlignmentMessage, Compared, MapVersion
 from mapweave_protocol.pairs import responsible
-
-from mapweave.maps import RobotMap
 
 PARAMETERS = AgentParameters(comparison_interval=5.0, comparison_rest=2.0)
 FIRST = responsible("a", "b")

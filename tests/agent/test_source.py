@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mapweave_agent.source import NOMINAL_PERIOD, LogSource, Pace, ScanRange, parse_rate
 
 from mapweave.errors import FileError
 from mapweave.scan import Scan
+from mapweave_agent.source import NOMINAL_PERIOD, LogSource, Pace, ScanRange, parse_rate
 
 
 def dues(stamps: list[float], rate: float = 1.0) -> list[float]:

@@ -2,9 +2,9 @@
 
 import argparse
 
-from tests.benchmarks import figure2, mapping
+from tests.benchmarks import figure2, fusion, mapping
 
-BENCHMARKS = {"figure2": figure2, "map": mapping}
+BENCHMARKS = {"figure2": figure2, "map": mapping, "fusion": fusion}
 
 
 def main() -> None:

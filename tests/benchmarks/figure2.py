@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
-from mapweave.drawing import FONT, GREY, INK, round_length, save
 from mapweave.layout import bounds, upright
 from mapweave.mapper import MapperParameters
 from mapweave.observation import observe
@@ -27,6 +26,8 @@ from tests.benchmarks.truth import paths
 
 PANEL = (4.6, 3.4)  # width and most height of each [in]
 ROOM = 0.04  # around a map, as a share of its width
+SCALE_BAR = 5.0  # [m]
+INK, GREY, FONT = "#16191d", "#6b7280", 9.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace) -> None:
         scans = load_scans(log)[options.first : options.first + options.count]
         before, after, figures = _simplify(scans)
         write_json(options.output.with_suffix(".json"), asdict(figures))
-        save(_draw(before, after, figures), options.output, options.output.suffix[1:])
+        _draw(before, after, figures).savefig(options.output)
         print(tell(figures))
         print(f"Drawn as {options.output}")
 
@@ -125,8 +126,8 @@ def _draw(before: FloatArray, after: FloatArray, figures: Simplification) -> Fig
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         _draw_segments(axes, segments, width=(0.25, 0.9)[k])
-        axes.set_title(title, fontsize=FONT + 1, color=INK)
-    _draw_scale(axes, low + 1.2 * margin, round_length(1.0 / scale))
+        axes.set_title(title, fontsize=FONT, color=INK)
+    _draw_scale(axes, low + 1.2 * margin, SCALE_BAR)
     return figure
 
 

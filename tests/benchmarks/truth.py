@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mapweave_deploy.verdict import component_path, fit
 from scipy.spatial import KDTree
 
 from mapweave import se2
 from mapweave.arrays import BoolArray, FloatArray, IntArray
 from mapweave.maps import RobotMap
+from mapweave_deploy.verdict import component_path, fit
 
 STEP_DISTANCE, STEP_TURN = 0.25, np.radians(5.0)  # [m], [rad] within which a step is right
 STAMP_TOLERANCE = 0.005  # [s] between the stamps of a relation and of its scans

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
 from mapweave_deploy.crew import Child, ChildDiedError, Crew
 from mapweave_deploy.launcher import free_endpoint
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import shapely
+
+from mapweave.arrays import FloatArray
 from mapweave_deploy.lidar import LidarParameters, cast_rays, measure
 from mapweave_deploy.office import office
 from mapweave_deploy.world import World, make_world
-
-from mapweave.arrays import FloatArray
 
 PERFECT = LidarParameters(noise=0.0, dropout=0.0, grazing=0.0, mixed=0.0)
 

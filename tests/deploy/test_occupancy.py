@@ -1,9 +1,9 @@
 """The occupancy grid that bytes are compared with."""
 
 import numpy as np
-from mapweave_deploy.occupancy import CELL, FREE, OCCUPIED, UNKNOWN, draw_grid
 
 from mapweave.scan import Scan
+from mapweave_deploy.occupancy import CELL, FREE, OCCUPIED, UNKNOWN, draw_grid
 
 
 def circle(radius: float) -> Scan:

@@ -1,6 +1,7 @@
 """What the launcher makes of a team's messages."""
 
 import pytest
+
 from mapweave_deploy.recorder import Recorder, is_done
 from mapweave_protocol.codec import encode
 from mapweave_protocol.inbox import Arrival

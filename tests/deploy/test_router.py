@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 
 import pytest
+
 from mapweave_deploy.launcher import free_endpoint
 from mapweave_deploy.router import cause_of
 from mapweave_protocol.session import open_session

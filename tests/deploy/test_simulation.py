@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mapweave_deploy.lidar import LidarParameters
-from mapweave_deploy.simulation import RobotLog, simulate
 
 from mapweave.errors import MapweaveError
 from mapweave.readers import read_scans
+from mapweave_deploy.lidar import LidarParameters
+from mapweave_deploy.simulation import RobotLog, simulate
 
 
 @pytest.fixture(scope="module")

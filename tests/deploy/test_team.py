@@ -9,11 +9,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+
+from mapweave.files import read_joint
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.codec import decode
 from mapweave_protocol.messages import JointMapMessage
-
-from mapweave.files import read_joint
 
 PROGRAM = [sys.executable, "-c", "import sys; from mapweave.cli import main; sys.exit(main())"]
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mapweave_deploy.roster import Member
-from mapweave_deploy.verdict import Limits, Verdict, fit, judge
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
+from mapweave_deploy.roster import Member
+from mapweave_deploy.verdict import Limits, Verdict, fit, judge
 
 LIMITS = Limits(0.3, np.radians(3.0))
 

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
+
 from mapweave_deploy.grid import make_grid
 from mapweave_deploy.simulation import BUILDERS, TOURS
 from mapweave_deploy.tours import Tour, plan_tours

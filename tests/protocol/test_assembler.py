@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from mapweave.maps import RobotMap, Submap
 from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE, MapAssembler, MapSender
 from mapweave_protocol.codec import decode
 from mapweave_protocol.messages import MapMessage
-
-from mapweave.maps import RobotMap, Submap
 
 MakeMap = Callable[..., RobotMap]
 

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from mapweave import se2
+from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap, Trajectory
 from mapweave_protocol.codec import MAX_BODY, decode, encode
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.geometry import PackedLines
@@ -20,9 +23,6 @@ from mapweave_protocol.messages import (
     Traffic,
 )
 from mapweave_protocol.model import Message
-
-from mapweave import se2
-from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap, Trajectory
 
 MakeMap = Callable[..., RobotMap]
 MakeJoint = Callable[..., JointMap]

@@ -1,12 +1,12 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mapweave_protocol.joint_sequence import MAX_TRIES, MAX_WAITING, JointSequence
-from mapweave_protocol.messages import JointMapMessage
-from mapweave_protocol.queries import JointQuery
 
 from mapweave.errors import MapweaveError
 from mapweave.maps import JointMap
+from mapweave_protocol.joint_sequence import MAX_TRIES, MAX_WAITING, JointSequence
+from mapweave_protocol.messages import JointMapMessage
+from mapweave_protocol.queries import JointQuery
 
 
 def message(version: int, series: str = "s1") -> JointMapMessage:

@@ -1,11 +1,11 @@
 import pytest
 import zenoh
+
+from mapweave.errors import InvalidIdError
 from mapweave_protocol import keys
 from mapweave_protocol.errors import ForeignKeyError
 from mapweave_protocol.keys import KeyFormat
 from mapweave_protocol.pairs import ordered, responsible
-
-from mapweave.errors import InvalidIdError
 
 FORMATS = [keys.MAP, keys.STATUS, keys.ALIGNMENT, keys.JOINT_MAP, keys.JOINT_QUERY, keys.LIVE]
 EXAMPLE = {"team": "rescue", "robot": "r1", "reference": "r1", "other": "r2", "boot": "0af3"}

@@ -7,9 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import islice
 
-import mapweave_protocol
 import pytest
 import zenoh
+
+import mapweave_protocol
+from mapweave.errors import InvalidIdError
+from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol import keys
 from mapweave_protocol.asking import ask_joint_maps, ask_robot_map
 from mapweave_protocol.assembler import MapSender
@@ -25,9 +28,6 @@ from mapweave_protocol.session import (
     default_endpoints,
     open_session,
 )
-
-from mapweave.errors import InvalidIdError
-from mapweave.maps import JointMap, RobotMap
 
 MakeMap = Callable[..., RobotMap]
 PATIENCE = 20.0  # [s] for what takes milliseconds on a quiet machine

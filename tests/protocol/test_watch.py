@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+
+from mapweave.maps import Alignment, Decision, JointMap, RobotMap
 from mapweave_protocol import keys
 from mapweave_protocol.codec import encode
 from mapweave_protocol.inbox import Arrival
@@ -21,8 +23,6 @@ from mapweave_protocol.messages import (
 from mapweave_protocol.session import declare_joint_publisher, declare_map_publisher, open_session
 from mapweave_protocol.story import Story
 from mapweave_protocol.watch import Watcher
-
-from mapweave.maps import Alignment, Decision, JointMap, RobotMap
 
 MakeMap = Callable[..., RobotMap]
 MakeJoint = Callable[..., JointMap]
