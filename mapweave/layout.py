@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapweave import se2
-from mapweave.arrays import FloatArray
+from mapweave.arrays import FloatArray, IntArray
 from mapweave.scene import Scene
 
 GAP = 0.06  # between components, as a share of the widest: clearly apart, little paper wasted
@@ -39,17 +39,22 @@ class Placed:
 
 def arrange(scenes: Sequence[Scene]) -> list[Placed]:
     """Return the scenes on one sheet, the largest first, from the top left."""
-    turned = [(scene, upright(scene)) for scene in scenes]
-    boxes = [bounds(_points(scene) @ se2.rotation(turn).T) for scene, turn in turned]
+    turns = [upright(scene) for scene in scenes]
+    boxes = [
+        bounds(_points(scene) @ se2.rotation(turn).T)
+        for scene, turn in zip(scenes, turns, strict=True)
+    ]
     sizes = np.array([box[1] - box[0] for box in boxes]).reshape(-1, 2)
     cells = np.maximum(sizes, [NARROWEST * sizes[:, 0].max(initial=0.0), 0.0])
-    placed = [
-        Placed(scene, np.array([*(corner - box[0]), turn]), np.stack([corner, corner + cell]))
-        for (scene, turn), box, cell, corner in zip(
-            turned, boxes, cells, _shelves(cells), strict=True
+    corners = _shelves(cells)
+    return [
+        Placed(
+            scenes[k],
+            np.array([*(corners[k] - boxes[k][0]), turns[k]]),
+            np.stack([corners[k], corners[k] + cells[k]]),
         )
+        for k in _largest_first(cells)
     ]
-    return sorted(placed, key=lambda each: -float(np.prod(each.box[1] - each.box[0])))
 
 
 def bounds(points: FloatArray) -> FloatArray:
@@ -87,17 +92,21 @@ def _points(scene: Scene) -> FloatArray:
     )
 
 
+def _largest_first(cells: FloatArray) -> IntArray:
+    return np.argsort(-np.prod(cells, axis=1), kind="stable")
+
+
 def _shelves(cells: FloatArray) -> FloatArray:
     """Return the (n, 2) lower left corners of (n, 2) `cells`, packed on shelves.
 
-    The highest go first, so that a shelf wastes little; the sheet grows downwards.
+    The largest go first; the sheet grows downwards.
     """
     gap = GAP * cells[:, 0].max(initial=0.0)
     spaced = cells + gap
     limit = max(spaced[:, 0].max(initial=0.0), np.sqrt(WIDE * np.prod(spaced, axis=1).sum()))
     corners = np.zeros_like(cells)
     x = top = shelf = 0.0
-    for index in np.argsort(-cells[:, 1], kind="stable"):
+    for index in _largest_first(cells):
         if x > 0 and x + spaced[index, 0] > limit * (1 + 1e-9):
             x, top, shelf = 0.0, top - shelf, 0.0
         corners[index] = x, top - cells[index, 1]
