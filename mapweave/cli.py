@@ -10,8 +10,11 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points, version
+from typing import TypeVar
 
 from mapweave.errors import MapweaveError
+
+T = TypeVar("T")
 
 COMMAND_GROUP = "mapweave.commands"
 EXIT_FAILED = 1
@@ -36,6 +39,18 @@ class Command:
     summary: str
     configure: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace], int]
+
+
+def argument(parse: Callable[[str], T]) -> Callable[[str], T]:
+    """Return `parse`, which raises ValueError, with its message as argparse shows it."""
+
+    def parse_argument(text: str) -> T:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return parse_argument
 
 
 def _overview(points: Sequence[str]) -> str:

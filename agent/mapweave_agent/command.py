@@ -4,24 +4,22 @@ import argparse
 import logging
 import math
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
-from mapweave.cli import Command
+from mapweave.cli import Command, argument
 from mapweave.fusion import align_robots
 from mapweave.mapper import Mapper
 from mapweave.names import check_id
+from mapweave.scan_range import ScanRange
 from mapweave_agent.agent import Agent
 from mapweave_agent.comparer import Comparer
 from mapweave_agent.planning import AgentParameters
-from mapweave_agent.source import LogSource, Pace, ScanRange, parse_rate
+from mapweave_agent.source import LogSource, Pace, parse_rate
 from mapweave_protocol.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.keys import new_boot
 from mapweave_protocol.session import open_session
 from mapweave_protocol.stopping import stop_on_signal
 
-T = TypeVar("T")
 _log = logging.getLogger(__name__)
 
 
@@ -30,21 +28,21 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log", required=True, type=Path, help="the laser log to play")
     parser.add_argument(
         "--rate",
-        type=_typed(parse_rate),
+        type=argument(parse_rate),
         default="1",
         metavar="X",
         help="how many times real time the log is played, or max (default 1)",
     )
     parser.add_argument(
         "--scans",
-        type=_typed(ScanRange.parse),
+        type=argument(ScanRange.parse),
         default=":",
         metavar="A:B",
         help="which scans, counted from 0, B not included",
     )
     parser.add_argument(
         "--map-interval",
-        type=_typed(_seconds),
+        type=argument(_seconds),
         default=AgentParameters().map_interval,
         metavar="S",
         help="least time between two messages of the growing submap [s] (default %(default)g)",
@@ -74,18 +72,6 @@ def _run(options: argparse.Namespace) -> int:
         agent = Agent(session, team, mapper, comparer, source.total, parameters)
         agent.run(source.scans(), pace, stop_on_signal())
     return 0
-
-
-def _typed(parse: Callable[[str], T]) -> Callable[[str], T]:
-    """Return `parse` with its message as argparse shows it."""
-
-    def parse_argument(text: str) -> T:
-        try:
-            return parse(text)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-
-    return parse_argument
 
 
 def _seconds(text: str) -> float:

@@ -1,6 +1,5 @@
 """Where a robot's scans come from: a log, played at the rate asked for."""
 
-import itertools
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -10,45 +9,13 @@ from pathlib import Path
 from mapweave.errors import FileError
 from mapweave.readers import read_scans
 from mapweave.scan import Scan
+from mapweave.scan_range import ScanRange
 
 NOMINAL_PERIOD = 0.2  # [s] between scans where the stamps do not tell; lidars turn at 5 Hz and more
 LONGEST_PAUSE = (
     10.0  # [s] between scans; a longer one is a clock that jumped, or a robot that slept
 )
 _NUMBER = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?|\.[0-9]{1,9}")
-_RANGE = re.compile(r"([0-9]{0,9}):([0-9]{0,9})")
-
-
-@dataclass(frozen=True, slots=True)
-class ScanRange:
-    """Which scans of a log: from `first`, up to before `end`; None is to the last."""
-
-    first: int = 0
-    end: int | None = None
-
-    @classmethod
-    def parse(cls, text: str) -> "ScanRange":
-        """Return the range that ``A:B`` says; either may be left out.
-
-        Raises
-        ------
-        ValueError
-            If it is none, or an empty one.
-        """
-        match = _RANGE.fullmatch(text)
-        first = int(match[1] or 0) if match else 0
-        end = int(match[2]) if match and match[2] else None
-        if match is None or (end is not None and end <= first):
-            raise ValueError(f"{text!r}: expected A:B, the first scan and the one after the last")
-        return cls(first, end)
-
-    def count(self, scans: int) -> int:
-        """Return how many of a log of `scans` scans it selects."""
-        end = scans if self.end is None else min(self.end, scans)
-        return max(0, end - self.first)
-
-    def __str__(self) -> str:
-        return f"{self.first}:{'' if self.end is None else self.end}"
 
 
 def parse_rate(text: str) -> float:
@@ -100,8 +67,7 @@ class LogSource:
 
     def scans(self) -> Iterator[Scan]:
         """Yield the selected scans, without odometry."""
-        everything = read_scans(self.path, on_warning=_already_warned)
-        return itertools.islice(everything, self.selected.first, self.selected.end)
+        return self.selected.of(read_scans(self.path, on_warning=_already_warned))
 
 
 def _already_warned(_: str) -> None:

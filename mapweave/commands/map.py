@@ -3,12 +3,11 @@
 import argparse
 import sys
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from mapweave.cli import Command
+from mapweave.cli import Command, argument
 from mapweave.errors import FileError, MapweaveError
 from mapweave.files import write_map
 from mapweave.mapper import Mapper
@@ -18,6 +17,7 @@ from mapweave.picture import check_picture_suffix, draw_map
 from mapweave.progress import track
 from mapweave.readers import count_scans, read_scans
 from mapweave.scan import Scan
+from mapweave.scan_range import ScanRange
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,11 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", metavar="MAP.json", type=Path, help="the map file to write")
     parser.add_argument("--robot", metavar="ID", default="r1", help="the robot's id (%(default)s)")
     parser.add_argument(
-        "--scans", metavar="A:B", type=scan_range, default=slice(None), help="only scans A to B - 1"
+        "--scans",
+        metavar="A:B",
+        type=argument(ScanRange.parse),
+        default=ScanRange(),
+        help="only scans A to B - 1",
     )
     parser.add_argument(
         "--odometry", choices=["none", "prior"], default="none", help="use the log's odometry"
@@ -33,18 +37,6 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plot", metavar="MAP.png", type=Path, help="the picture to write (png, svg)"
     )
-
-
-def scan_range(text: str) -> slice:
-    """Return the scans that ``A:B`` names, both optional, counted from 0; for argparse."""
-    first, colon, last = text.partition(":")
-    try:
-        chosen = slice(int(first) if first else 0, int(last) if last else None)
-    except ValueError:
-        colon = ""
-    if not colon or chosen.start < 0 or (chosen.stop is not None and chosen.stop <= chosen.start):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected A:B with 0 <= A < B")
-    return chosen
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -62,10 +54,10 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _map_log(log: Path, robot: str, chosen: slice) -> tuple[RobotMap, int]:
+def _map_log(log: Path, robot: str, chosen: ScanRange) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
     mapper = Mapper(robot)
-    total = len(range(*chosen.indices(count_scans(log)))) if sys.stderr.isatty() else None
+    total = chosen.count(count_scans(log)) if sys.stderr.isatty() else None
     taken = 0
     for scan in track(_chosen_scans(log, chosen), f"mapping {log.name}", total):
         mapper.add(scan)
@@ -80,8 +72,8 @@ def _map_log(log: Path, robot: str, chosen: slice) -> tuple[RobotMap, int]:
     return robot_map, taken
 
 
-def _chosen_scans(log: Path, chosen: slice) -> Iterator[Scan]:
-    return islice(read_scans(log, on_warning=_warn), chosen.start, chosen.stop)
+def _chosen_scans(log: Path, chosen: ScanRange) -> Iterator[Scan]:
+    return chosen.of(read_scans(log, on_warning=_warn))
 
 
 def _warn(message: str) -> None:

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from mapweave.errors import FileError
 from mapweave.scan import Scan
-from mapweave_agent.source import NOMINAL_PERIOD, LogSource, Pace, ScanRange, parse_rate
+from mapweave.scan_range import ScanRange
+from mapweave_agent.source import NOMINAL_PERIOD, LogSource, Pace, parse_rate
 
 
 def dues(stamps: list[float], rate: float = 1.0) -> list[float]:
