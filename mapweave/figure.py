@@ -4,6 +4,7 @@ There are no axes: nobody reads coordinates off a floor plan, and the scale bar 
 `mapweave.picture` is the way in.
 """
 
+import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ NAMES = 0.2  # above it as well, where components are named [in]
 GAP = 0.15  # between the map and what is beneath [in]
 MAP_HEIGHT = (1.5, 8.0)  # least and most [in]
 ROW = 0.21  # of the legend [in]
-COLUMNS = 4  # of the legend: as many names of robots fit next to the scale bar
+HANDLE = 0.5  # a legend entry without its words [in]
 SCALE_BAR = 1.4  # at most [in]
 FONT = 8.0  # [pt]
 CHARACTER = 0.55 * FONT / 72  # mean width of one [in]
@@ -67,7 +68,7 @@ def draw(scenes: Sequence[Scene], title: str, subtitle: str) -> Figure:
     """Return a figure of `scenes`, side by side, all at one scale."""
     placed, style = arrange(scenes), choose_style(scenes)
     legend = _legend_rows(scenes, style)
-    sheet = _plan(placed, sum(-(-len(row) // COLUMNS) for row in legend))
+    sheet = _plan(placed, sum(_lines(row) for row in legend))
     figure = Figure(figsize=(WIDTH, sheet.height), dpi=DPI, facecolor="white")
     axes = _map_axes(figure, sheet)
     for each in placed:
@@ -172,6 +173,18 @@ def _line(label: str, colour: str, width: float, marker: str = "none") -> Line2D
     return Line2D([], [], color=colour, linewidth=width, marker=marker, markersize=5, label=label)
 
 
+def _columns(row: Sequence[Artist]) -> int:
+    """Return how many entries fit next to the scale bar: all, or else as if all were the widest."""
+    room = WIDTH - 2 * MARGIN - SCALE_BAR
+    widths = [HANDLE + CHARACTER * len(str(entry.get_label())) for entry in row]
+    return len(row) if sum(widths) <= room else max(1, int(room / max(widths)))
+
+
+def _lines(row: Sequence[Artist]) -> int:
+    """Return in how many lines the entries go."""
+    return math.ceil(len(row) / _columns(row)) if row else 0
+
+
 def _draw_legend(figure: Figure, rows: Sequence[Sequence[Artist]]) -> None:
     bottom = GAP / figure.get_figheight()
     for row in reversed(rows):
@@ -181,11 +194,11 @@ def _draw_legend(figure: Figure, rows: Sequence[Sequence[Artist]]) -> None:
             bbox_to_anchor=(1 - MARGIN / WIDTH, bottom),
             borderaxespad=0.0,
             borderpad=0.0,
-            ncols=min(COLUMNS, len(row)),
+            ncols=_columns(row),
             frameon=False,
             fontsize=FONT,
             labelcolor=INK,
             handlelength=1.8,
             columnspacing=1.6,
         )
-        bottom += ROW * -(-len(row) // COLUMNS) / figure.get_figheight()
+        bottom += ROW * _lines(row) / figure.get_figheight()

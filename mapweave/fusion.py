@@ -145,12 +145,22 @@ def find_alignments(first: Shape, second: Shape, p: FusionParameters) -> list[Hy
     verdicts = [_verdict(first, second, t, p) for t in aligned]
     scores = np.array([v.score for v in verdicts])
     middle = second.raster.surface.points.mean(axis=0)
-    leaders = different(aligned, scores, middle, p.hypotheses)[:2]
-    fine = [
-        _refine(second, target, aligned[k], p.fine_icp, len(second.raster.weight)) for k in leaders
-    ]
-    found = [_judged(first, second, t, middle, p) for t in fine]
+    leaders = different(aligned, scores, middle, p.hypotheses)
+    found: list[Hypothesis] = []
+    for start in aligned[leaders]:
+        fine = _refine(second, target, start, p.fine_icp, len(second.raster.weight))
+        hypothesis = _judged(first, second, fine, middle, p)
+        # Two that ended in the same place are one, and not each other's rival.
+        if not found or _differ(found[0], hypothesis, p.hypotheses):
+            found.append(hypothesis)
+        if len(found) == 2:
+            break
     return sorted(found, key=lambda h: -h.verdict.score)
+
+
+def _differ(one: Hypothesis, other: Hypothesis, p: HypothesisParameters) -> bool:
+    distance, turn = _difference(one, other)
+    return distance > p.distance or turn > p.turn
 
 
 def _judged(
