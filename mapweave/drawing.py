@@ -72,28 +72,32 @@ def draw_scene(axes: Axes, placed: Placed, style: Style) -> None:
 
 def _draw_floors(axes: Axes, placed: Placed, style: Style) -> None:
     scene = placed.scene
-    _draw_floor(axes, placed.pose, scene.map.free_space, FLOOR, 1.0)
+    _draw_floor(axes, _floor(placed.pose, scene.map.free_space), FLOOR, 1.0, f"floor-{scene.name}")
     if style.team:
         for name, polygons in scene.seen.items():
-            _draw_floor(axes, placed.pose, polygons, style.colours[robot_of(name)], TINT)
+            seen = _floor(placed.pose, polygons)
+            _draw_floor(axes, seen, style.colours[robot_of(name)], TINT, f"seen-{name}")
+
+
+def _floor(pose: FloatArray, polygons: Sequence[FloatArray]) -> list[Outline]:
+    """Return the outlines of the union of `polygons`, in the frame at `pose`: none overlap."""
+    union = from_rings(se2.transform_points(pose, polygon) for polygon in polygons)
+    floor = union.buffer(-GLIMPSE, quad_segs=4).buffer(GLIMPSE, quad_segs=4)
+    return [
+        Outline(np.asarray(ring.coords), closed=True)
+        for part in shapely.get_parts(floor)
+        for ring in (part.exterior, *part.interiors)
+    ]
 
 
 def _draw_floor(
-    axes: Axes, pose: FloatArray, polygons: Sequence[FloatArray], colour: str, opacity: float
+    axes: Axes, outlines: Sequence[Outline], colour: str, opacity: float, name: str
 ) -> None:
-    """Fill the union of `polygons`, in the frame at `pose`: overlaps must not show."""
-    union = from_rings(se2.transform_points(pose, polygon) for polygon in polygons)
-    open_floor = union.buffer(-GLIMPSE, quad_segs=4).buffer(GLIMPSE, quad_segs=4)
-    rings = [
-        Outline(np.asarray(ring.coords), closed=True)
-        for part in shapely.get_parts(open_floor)
-        for ring in (part.exterior, *part.interiors)
-    ]
-    if rings:
-        outline = Outline.make_compound_path(*rings)
-        axes.add_patch(
-            PathPatch(outline, facecolor=colour, edgecolor="none", alpha=opacity, zorder=1)
-        )
+    if outlines:
+        whole = Outline.make_compound_path(*outlines)
+        floor = PathPatch(whole, facecolor=colour, edgecolor="none", alpha=opacity, zorder=1)
+        floor.set_gid(name)
+        axes.add_patch(floor)
 
 
 def _draw_walls(axes: Axes, placed: Placed, strong: int) -> None:
