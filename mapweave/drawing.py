@@ -133,7 +133,8 @@ def _draw_paths(axes: Axes, placed: Placed, style: Style) -> None:
         name = f"path-{path.component}-{path.scan_index[0]}"
         axes.plot(x, y, color=colour, linewidth=0.8, alpha=0.9, zorder=4, gid=name)
     for name, start in _starts(scene).items():
-        _draw_start(axes, se2.compose(placed.pose, start), style.colours[robot_of(name)])
+        pose = se2.compose(placed.pose, start)
+        _draw_start(axes, pose, style.colours[robot_of(name)], f"start-{name}")
 
 
 def _starts(scene: Scene) -> dict[str, FloatArray]:
@@ -144,7 +145,7 @@ def _starts(scene: Scene) -> dict[str, FloatArray]:
     return starts
 
 
-def _draw_start(axes: Axes, pose: FloatArray, colour: str) -> None:
+def _draw_start(axes: Axes, pose: FloatArray, colour: str, name: str) -> None:
     """Draw an arrowhead at `pose`, in the direction the robot looked."""
     axes.plot(
         pose[0],
@@ -156,4 +157,5 @@ def _draw_start(axes: Axes, pose: FloatArray, colour: str) -> None:
         markeredgecolor="white",
         markeredgewidth=0.8,
         zorder=5,
+        gid=name,
     )
