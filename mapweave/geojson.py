@@ -16,7 +16,7 @@ One FeatureCollection; ``properties.kind`` tells what a feature is:
 
 Each has ``component``, in whose frame its coordinates are. GeoJSON presumes longitude and latitude
 on Earth; these are metres in a frame that nobody has placed on Earth, as ``crs: null`` says in the
-way of GeoJSON 2008 and ``coordinates`` in words. Programs must not reproject them.
+way of GeoJSON 2008 and ``frame`` in words. Programs must not reproject them.
 """
 
 import math
@@ -39,7 +39,7 @@ def feature_collection(scenes: Sequence[Scene]) -> Json:
     return {
         "type": "FeatureCollection",
         "crs": None,
-        "coordinates": FRAME_NOTE,
+        "frame": FRAME_NOTE,
         "components": [_component(scene) for scene in scenes],
         "features": [feature for scene in scenes for feature in _features(scene)],
     }

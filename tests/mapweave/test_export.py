@@ -128,7 +128,9 @@ def test_geojson_says_that_its_coordinates_are_nowhere_on_earth(
     content = exported(robot_map(rng), tmp_path)
     assert content["type"] == "FeatureCollection"
     assert content["crs"] is None
-    assert "not longitude and latitude" in content["coordinates"]
+    # RFC 7946, 7.1: what belongs to other GeoJSON types may not stand in a collection.
+    assert not {"coordinates", "geometry", "geometries", "properties"} & content.keys()
+    assert "not longitude and latitude" in content["frame"]
 
 
 def test_a_path_of_one_scan_is_a_point(rng: Generator, tmp_path: Path) -> None:
