@@ -10,8 +10,8 @@ One FeatureCollection; ``properties.kind`` tells what a feature is:
 `free_space`   Polygon                     ``robot``, for a robot's own map
 `trajectory`   LineString, Point of one    ``robot``, ``scan_index``, ``stamp`` [s] and ``theta``
                scan                        [rad]: one number a position
-`robot`        Point: the origin of a      ``robot`` and ``theta`` [rad], joint maps only
-               robot's component
+`robot`        Point: the origin of a      ``robot``, ``origin_of`` (its component, as ``a/0``) and
+               robot's component           ``theta`` [rad], joint maps only
 =============  ==========================  =========================================================
 
 Each has ``component``, in whose frame its coordinates are. GeoJSON presumes longitude and latitude
