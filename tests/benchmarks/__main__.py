@@ -1,20 +1,55 @@
-"""``python -m tests.benchmarks [figure2 | map | fusion | …]``."""
+"""``python -m tests.benchmarks [figure2 | map | fusion | confidence | wire]``."""
 
 import argparse
+import sys
+import time
+from typing import Protocol
 
-from tests.benchmarks import figure2, fusion, mapping
+from tests.benchmarks import figure2, fit_confidence, fusion, mapping, wire
 
-BENCHMARKS = {"figure2": figure2, "map": mapping, "fusion": fusion}
+
+class Benchmark(Protocol):
+    """What each module of a benchmark offers."""
+
+    __doc__: str | None
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Add its own arguments."""
+
+    def run(self, options: argparse.Namespace) -> None:
+        """Measure, print, write."""
+
+
+BENCHMARKS: dict[str, Benchmark] = {
+    "figure2": figure2,
+    "map": mapping,
+    "fusion": fusion,
+    "confidence": fit_confidence,
+    "wire": wire,
+}
+USUAL = ("figure2", "map", "fusion")
 
 
 def main() -> None:
+    """Run the benchmark that was asked for, or the usual ones one after the other."""
+    parser = _parser()
+    asked = [sys.argv[1:]] if len(sys.argv) > 1 else [[name] for name in USUAL]
+    if len(asked) > 1:
+        print(f"{', '.join(USUAL)}: some 20 to 40 minutes on two cores; one alone: name it")
+    for arguments in asked:
+        options = parser.parse_args(arguments)
+        start = time.monotonic()
+        BENCHMARKS[options.benchmark].run(options)
+        print(f"{options.benchmark} took {time.monotonic() - start:.0f} s\n", flush=True)
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks")
-    commands = parser.add_subparsers(dest="benchmark")
+    commands = parser.add_subparsers(dest="benchmark", required=True)
     for name, module in BENCHMARKS.items():
-        summary = (module.__doc__ or "").strip().partition("\n")[0]
+        summary = (module.__doc__ or "").partition("\n")[0]
         module.add_arguments(commands.add_parser(name, help=summary, description=summary))
-    options = parser.parse_args()
-    BENCHMARKS[options.benchmark].run(options)
+    return parser
 
 
 if __name__ == "__main__":

@@ -66,13 +66,26 @@ def steps_right(found: list[Path2D], truth: FloatArray) -> BoolArray:
     return right
 
 
+def true_frame(path: Path2D, truth: FloatArray) -> FloatArray:
+    """Return (3,) where the component's frame is in that of `truth` (n, 3), as all scans say.
+
+    NaN where the truth of none is known.
+    """
+    known = np.isfinite(truth[path.index, 0])
+    if not known.any():
+        return np.full(3, np.nan)
+    return fit(path.pose[known], truth[path.index[known]])
+
+
 def position_error(path: Path2D, truth: FloatArray) -> float:
-    """Return the rms [m] between the positions of `path`, moved rigidly, and `truth` (n, 3)."""
-    true = truth[path.index]
-    known = np.isfinite(true[:, 0])
-    frame = fit(path.pose[known], true[known])
-    apart = se2.transform_points(frame, path.pose[known, :2]) - true[known, :2]
-    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+    """Return the rms [m] between the positions of `path`, moved rigidly, and `truth` (n, 3).
+
+    NaN where the truth of none is known.
+    """
+    placed = se2.transform_points(true_frame(path, truth), path.pose[:, :2])
+    squared = np.sum((placed - truth[path.index, :2]) ** 2, axis=1)
+    known = squared[np.isfinite(squared)]
+    return float(np.sqrt(known.mean())) if len(known) else np.nan
 
 
 @dataclass(frozen=True, slots=True)

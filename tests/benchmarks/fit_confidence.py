@@ -1,0 +1,160 @@
+"""Confidence: fits its model on the pairs of `fusion`, and reports on buildings held out.
+
+The model answers for the best hypothesis of a pair, so each pair counts once: its best hypothesis,
+accepted or not, and whether that was right within 0.5 m and 5°.
+"""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mapweave.arrays import BoolArray, FloatArray
+from mapweave.confidence import ConfidenceParameters, features
+from mapweave.verification import Verdict, VerificationParameters
+from tests.benchmarks.fusion import ROWS
+from tests.benchmarks.logistic import (
+    Bin,
+    Logistic,
+    brier_score,
+    calibration_error,
+    fit_logistic,
+    reliability,
+)
+from tests.benchmarks.tables import OUTPUT, format_table, write_json
+
+NAMES = [name for name in ConfidenceParameters.model_fields if name != "intercept"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Examples:
+    """The best hypotheses of n pairs.
+
+    Attributes
+    ----------
+    features
+        (n, k) what the model looks at.
+    right
+        (n,)
+    accepted
+        (n,)
+    buildings
+        The two of each pair.
+    """
+
+    features: FloatArray
+    right: BoolArray
+    accepted: BoolArray
+    buildings: list[tuple[str, str]]
+
+    def touches(self, building: str) -> BoolArray:
+        """Tell which pairs involve `building`."""
+        return np.array([building in pair for pair in self.buildings], dtype=np.bool_)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say where the rows are and where the plot goes."""
+    parser.add_argument("--rows", type=Path, default=ROWS, help="of `fusion` (%(default)s)")
+    parser.add_argument(
+        "--output", type=Path, default=OUTPUT / "confidence.png", help="plot (%(default)s)"
+    )
+
+
+def run(options: argparse.Namespace) -> None:
+    """Report on held-out buildings, then fit on all and print what to paste."""
+    examples = read_examples(options.rows)
+    held_out = predict_held_out(examples)
+    present = _present_model().predict(examples.features)
+    for name, said in (("present coefficients", present), ("fitted, held out", held_out)):
+        print(tell(name, said, examples))
+    bins = reliability(held_out, examples.right)
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    _draw(bins).savefig(options.output)
+    fitted = fit_logistic(examples.features, examples.right)
+    coefficients = dict(zip(["intercept", *NAMES], [fitted.intercept, *fitted.slopes], strict=True))
+    write_json(options.output.with_suffix(".json"), coefficients)
+    print("Fitted to all pairs, for ConfidenceParameters:")
+    for name, value in coefficients.items():
+        print(f"    {name}: {value:.3g}")
+    print(f"Reliability is drawn as {options.output}")
+
+
+def read_examples(file: Path) -> Examples:
+    """Read the rows that `fusion` wrote; pairs without any hypothesis teach nothing."""
+    rows = [row for row in json.loads(file.read_text()) if row["evidence"]]
+    return Examples(
+        np.array([features(*_verdicts(row)) for row in rows]),
+        np.array([row["right"] for row in rows], dtype=np.bool_),
+        np.array([row["decision"] == "accepted" for row in rows], dtype=np.bool_),
+        [(row["buildings"][0], row["buildings"][1]) for row in rows],
+    )
+
+
+def _verdicts(row: dict[str, Any]) -> tuple[Verdict, Verdict | None]:
+    rival = row["runner_up"]
+    return _verdict(row["evidence"]), None if rival is None else _verdict(rival)
+
+
+def _verdict(numbers: dict[str, float]) -> Verdict:
+    names = ("common", "contradicted", "overlap", "residual", "held")
+    weight = VerificationParameters().contradiction_weight
+    return Verdict(**{name: numbers[name] for name in names}, contradiction_weight=weight)
+
+
+def predict_held_out(examples: Examples) -> FloatArray:
+    """Return (n,) what models say that never saw the pair's buildings.
+
+    A pair across buildings is predicted by the model that saw neither of them.
+    """
+    said = np.empty(len(examples.right))
+    for pair in sorted(set(examples.buildings)):
+        asked = np.array([each == pair for each in examples.buildings])
+        seen = ~(examples.touches(pair[0]) | examples.touches(pair[1]))
+        model = fit_logistic(examples.features[seen], examples.right[seen])
+        said[asked] = model.predict(examples.features[asked])
+    return said
+
+
+def _present_model() -> Logistic:
+    p = ConfidenceParameters()
+    return Logistic(p.intercept, np.array([getattr(p, name) for name in NAMES]))
+
+
+def tell(name: str, said: FloatArray, examples: Examples) -> str:
+    """Return scores and the reliability table as text."""
+    bins = reliability(said, examples.right)
+    rows = [[f"{b.said:.3f}", f"{b.came:.3f}", str(b.count)] for b in bins]
+    within = np.array([a == b for a, b in examples.buildings])
+    groups = {"all pairs": within | True, "one building": within, "accepted": examples.accepted}
+    lines = [f"{name}:"]
+    lines += [f"  {_tell_scores(group, said[k], examples.right[k])}" for group, k in groups.items()]
+    return "\n".join([*lines, format_table(["  said", "came", "pairs"], rows), ""])
+
+
+def _tell_scores(group: str, said: FloatArray, right: BoolArray) -> str:
+    if len(said) == 0:
+        return f"{group}: none"
+    error = calibration_error(reliability(said, right))
+    return (
+        f"{group}: {len(said)}, {right.mean():.0%} right, Brier score"
+        f" {brier_score(said, right):.4f}, expected calibration error {error:.3f}"
+    )
+
+
+def _draw(bins: Sequence[Bin]) -> Figure:
+    figure = Figure(figsize=(4.2, 4.2), dpi=150, facecolor="white", layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot([0, 1], [0, 1], color="#b4bcc6", linewidth=1)
+    axes.scatter(
+        [b.said for b in bins], [b.came for b in bins], s=[8 * b.count**0.5 + 8 for b in bins]
+    )
+    for b in bins:
+        axes.annotate(str(b.count), (b.said, b.came), (6, -10), textcoords="offset points")
+    axes.set(xlabel="confidence said", ylabel="share right", aspect="equal")
+    axes.set_title("Held-out buildings; numbers are pairs", fontsize=9)
+    return figure
