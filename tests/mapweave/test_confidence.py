@@ -1,0 +1,49 @@
+"""Confidence is a probability that grows with what speaks for an alignment."""
+
+import numpy as np
+import pytest
+
+from mapweave.confidence import ConfidenceParameters, confidence, features
+from mapweave.verification import Verdict
+
+P = ConfidenceParameters()
+
+
+def verdict(common: float, contradicted: float = 0.0, held: float = 10.0) -> Verdict:
+    overlap = common / max(common + contradicted, 1e-9)
+    return Verdict(common, contradicted, overlap, 0.03, held, 1.0)
+
+
+def test_it_is_a_probability_even_for_nonsense() -> None:
+    for best in (verdict(0), verdict(1e6, held=1e6), verdict(0, 1e6), verdict(5, held=-1.0)):
+        assert 0 <= confidence(best, None, P) <= 1
+
+
+def test_it_is_the_logistic_function_of_the_features() -> None:
+    best, rival = verdict(30, 2), verdict(12, 3)
+    odds = P.intercept + features(best, rival) @ [P.common, P.overlap, P.held, P.margin]
+    assert confidence(best, rival, P) == pytest.approx(1 / (1 + np.exp(-odds)))
+
+
+@pytest.mark.parametrize(
+    ("less", "more"),
+    [
+        (verdict(10), verdict(20)),
+        (verdict(20, 4), verdict(20, 1)),
+        (verdict(20, held=2), verdict(20, held=8)),
+    ],
+    ids=["metres in common", "share in common", "what holds"],
+)
+def test_it_grows_with_what_speaks_for_the_alignment(less: Verdict, more: Verdict) -> None:
+    rival = verdict(5)
+    assert confidence(more, rival, P) > confidence(less, rival, P)
+
+
+def test_a_strong_rival_lowers_it_and_a_hopeless_one_counts_as_none() -> None:
+    best = verdict(20)
+    assert confidence(best, verdict(18), P) < confidence(best, verdict(4), P)
+    assert confidence(best, verdict(1, 9), P) == confidence(best, None, P)
+
+
+def test_a_hypothesis_more_contradicted_than_matched_has_no_margin() -> None:
+    assert features(verdict(3, 9), None)[3] == 0
