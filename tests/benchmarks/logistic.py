@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 
 from mapweave.arrays import BoolArray, FloatArray
 
-RIDGE = 1.0  # weight of a slope² against one pair's loss; features are standardised
+RIDGE = 0.1  # weight of half a slope² against one pair's loss; features are standardised
 BINS = 10
 
 
