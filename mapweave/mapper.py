@@ -12,6 +12,7 @@ from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
 from mapweave.fusion import FusionParameters
+from mapweave.loop_closing import LoopCloser, LoopParameters
 from mapweave.maps import LineMap, RobotMap, Submap
 from mapweave.names import check_id
 from mapweave.observation import Observation, ObservationParameters, observe
@@ -30,6 +31,7 @@ class MapperParameters(BaseModel):
     tracker: TrackerParameters = TrackerParameters()
     submap: SubmapParameters = SubmapParameters()
     fusion: FusionParameters = FusionParameters()
+    loops: LoopParameters = LoopParameters()
     patience: int = Field(
         5, ge=1, description="scans in a row that fit nowhere before the robot counts as lost"
     )
@@ -74,6 +76,8 @@ class Mapper:
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         self._waiting: list[Observation] = []
+        self._loops = LoopCloser(self.parameters.loops)
+        self._follows = False  # whether the growing submap was tracked from the last finished one
 
     def add(self, scan: Scan) -> Placement:
         """Take the next scan."""
@@ -137,6 +141,7 @@ class Mapper:
         if not self._growing.is_empty:
             self._finish_submap()
         self._component = 1 + max((s.component for s in self._finished), default=-1)
+        self._follows = False
         self._tracker = Tracker(self.parameters.tracker)
         self._origin = self._frame = se2.IDENTITY
         for seen in waiting:
@@ -156,7 +161,14 @@ class Mapper:
 
     def _finish_submap(self) -> None:
         """Close the growing submap, and join its component to an older one where shapes allow."""
-        self._finished = list(reunite([*self._finished, self._submap()], self.parameters.fusion))
+        submaps = [*self._finished, self._submap()]
+        if self._follows and len(submaps) > 1:
+            self._loops.track(submaps[-2], submaps[-1])
+        submaps, joints = reunite(submaps, self.parameters.fusion)
+        for older, younger in joints:
+            self._loops.join(submaps[older], submaps[younger])
+        self._finished = self._loops.close(submaps)
+        self._follows = True
         last = self._finished[-1]
         self._component = last.component
         self._origin = se2.compose(last.pose, se2.inverse(self._frame))

@@ -1,0 +1,202 @@
+"""Closing loops: a finished submap is found in the robot's older ones.
+
+The engine is fusion's, hypothesise and verify, with one difference: drift is slow, so the true
+pose is near the one believed. Every pose within the drift that may have come together since is a
+hypothesis; what both submaps saw decides.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.hypotheses import HypothesisParameters, different
+from mapweave.icp import Fit, IcpParameters, Target, align
+from mapweave.map_raster import MapRaster, RasterParameters
+from mapweave.maps import Submap
+from mapweave.pose_graph import Link, optimise
+from mapweave.verification import Verdict, VerificationParameters, coarse_scores, verify
+
+
+class LoopParameters(BaseModel):
+    """Where closures are looked for and what they must show."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    raster: RasterParameters = RasterParameters()
+    verification: VerificationParameters = VerificationParameters()
+    hypotheses: HypothesisParameters = HypothesisParameters(count=3, distance=0.6)
+    icp: IcpParameters = IcpParameters(start_scale=0.4, end_scale=0.05)
+    candidates: int = Field(8, ge=1, description="older submaps compared, the nearest")
+    reach: float = Field(12.0, gt=0, description="[m] between the middles of submaps compared")
+    drift: float = Field(0.01, gt=0, description="[m/m] of path, the most that is expected")
+    min_drift: float = Field(0.6, gt=0, description="[m] searched at the least")
+    max_drift: float = Field(4.0, gt=0, description="[m] searched at the most")
+    turn_drift: float = Field(0.001, gt=0, description="[rad/m] of path, the most expected")
+    min_turn: float = Field(0.06, gt=0, description="[rad] searched at the least")
+    max_turn: float = Field(0.26, gt=0, description="[rad] searched at the most: 15°")
+    step: float = Field(0.3, gt=0, description="[m] between hypotheses")
+    turn_step: float = Field(0.03, gt=0, description="[rad] between hypotheses")
+    max_samples: int = Field(150, ge=10, description="of a submap's walls, scoring hypotheses")
+    min_common: float = Field(6.0, gt=0, description="[m] of wall in common")
+    min_overlap: float = Field(0.85, gt=0, le=1, description="share in common of what both saw")
+    min_held: float = Field(2.0, gt=0, description="[m] of common wall across any direction")
+    max_rival: float = Field(0.75, gt=0, description="score of the next best pose, as a share")
+    tracking_sigma: float = Field(0.03, gt=0, description="[m] from a submap to the next")
+    tracking_turn: float = Field(0.005, gt=0, description="[rad] from a submap to the next")
+    joining_sigma: float = Field(0.1, gt=0, description="[m] of components joined by their shapes")
+    joining_turn: float = Field(0.01, gt=0, description="[rad] of components joined")
+    residual: float = Field(
+        0.5,
+        gt=0,
+        description="[m] of one wall sample against the pose: far above a laser's,"
+        " because samples of one wall err together",
+    )
+    min_sigma: float = Field(0.02, gt=0, description="[m] no closure is better than that")
+    min_turn_sigma: float = Field(0.003, gt=0, description="[rad] no closure is better")
+
+
+class LoopCloser:
+    """Remembers what it compared, so that each pair of submaps is compared once."""
+
+    def __init__(self, parameters: LoopParameters) -> None:
+        self._parameters = parameters
+        self._rasters: dict[int, MapRaster] = {}
+        self._targets: dict[int, Target] = {}
+        self._closures: list[Link] = []
+        self._tracking: list[Link] = []
+
+    def track(self, previous: Submap, submap: Submap) -> None:
+        """Note that `submap` followed `previous`, both of one component, by tracking."""
+        p = self._parameters
+        sigmas = np.array([p.tracking_sigma, p.tracking_sigma, p.tracking_turn])
+        step = se2.between(previous.pose, submap.pose)
+        self._tracking.append(Link(previous.id, submap.id, step, np.diag(sigmas**2), True))
+
+    def join(self, older: Submap, younger: Submap) -> None:
+        """Note that two components were joined, at the present poses of these two submaps."""
+        p = self._parameters
+        sigmas = np.array([p.joining_sigma, p.joining_sigma, p.joining_turn])
+        step = se2.between(older.pose, younger.pose)
+        self._tracking.append(Link(older.id, younger.id, step, np.diag(sigmas**2), True))
+
+    def close(self, submaps: Sequence[Submap]) -> list[Submap]:
+        """Look for the last of `submaps` among the others; return all at their best poses."""
+        found = self._closures_of(submaps)
+        if not found:
+            return list(submaps)
+        self._closures += found
+        return self._fitted(submaps)
+
+    def _closures_of(self, submaps: Sequence[Submap]) -> list[Link]:
+        *older, newest = submaps
+        if len(newest.map.segments) == 0:
+            return []
+        here = _middle(newest)
+        near = [
+            (float(np.hypot(*(_middle(s) - here))), s)
+            for s in older[:-1]
+            if s.component == newest.component and len(s.map.segments)
+        ]
+        chosen = sorted(near, key=lambda item: item[0])[: self._parameters.candidates]
+        paths = _path_lengths(submaps)
+        links = [
+            self._compare(s, newest, paths[-1] - paths[k])
+            for k, s in enumerate(older)
+            if any(s is c and d < self._parameters.reach for d, c in chosen)
+        ]
+        return [link for link in links if link is not None]
+
+    def _compare(self, older: Submap, newest: Submap, path: float) -> Link | None:
+        """Return the link from `older` to `newest`, where what both saw proves one."""
+        p = self._parameters
+        reference, other = self._raster(older), self._raster(newest)
+        believed = se2.between(older.pose, newest.pose)
+        starts = _around(believed, other.surface.points.mean(axis=0), path, p)
+        scores = coarse_scores(reference, other, starts, p.max_samples, p.verification)
+        middle = other.surface.points.mean(axis=0)
+        leaders = different(starts, scores, middle, p.hypotheses)
+        fits = [align(other.surface, self._target(older), starts[k], p.icp) for k in leaders]
+        verdicts = [verify(reference, other, fit.pose, p.verification) for fit in fits]
+        poses = np.array([fit.pose for fit in fits])
+        ranked = different(poses, np.array([v.score for v in verdicts]), middle, p.hypotheses)
+        if not _proves([verdicts[k] for k in ranked], p):
+            return None
+        fit = fits[ranked[0]]
+        return Link(older.id, newest.id, fit.pose, _covariance(fit, p), False)
+
+    def _fitted(self, submaps: Sequence[Submap]) -> list[Submap]:
+        """Fit the component of the last submap to all links; others stay."""
+        component = submaps[-1].component
+        index = {s.id: k for k, s in enumerate(s for s in submaps if s.component == component)}
+        links = [
+            Link(index[e.first], index[e.second], e.transform, e.covariance, e.trusted)
+            for e in (*self._tracking, *self._closures)
+            if e.first in index and e.second in index
+        ]
+        start = np.array([s.pose for s in submaps if s.component == component])
+        poses, _ = optimise(start, links)
+        return [s if s.id not in index else replace(s, pose=poses[index[s.id]]) for s in submaps]
+
+    def _raster(self, submap: Submap) -> MapRaster:
+        if submap.id not in self._rasters:
+            self._rasters[submap.id] = MapRaster.of(submap.map, self._parameters.raster)
+        return self._rasters[submap.id]
+
+    def _target(self, submap: Submap) -> Target:
+        if submap.id not in self._targets:
+            surface = self._raster(submap).surface
+            self._targets[submap.id] = Target.of(surface, self._parameters.icp)
+        return self._targets[submap.id]
+
+
+def _middle(submap: Submap) -> FloatArray:
+    """(2,) middle of a submap's path, component frame [m]."""
+    return se2.transform_points(submap.pose, submap.trajectory.pose[:, :2]).mean(axis=0)
+
+
+def _path_lengths(submaps: Sequence[Submap]) -> FloatArray:
+    """(n,) path driven up to the end of each submap [m]."""
+    steps = [np.diff(s.trajectory.pose[:, :2], axis=0) for s in submaps]
+    return np.cumsum([float(np.hypot(*step.T).sum()) for step in steps])
+
+
+def _around(believed: FloatArray, middle: FloatArray, path: float, p: LoopParameters) -> FloatArray:
+    """(k, 3) every pose within the drift of `path` [m] about the `believed` one.
+
+    Turns are about `middle` (2,), the middle of what is turned, so that they do not shift it.
+    """
+    reach = min(max(p.min_drift, p.drift * path), p.max_drift)
+    turn = min(max(p.min_turn, p.turn_drift * path), p.max_turn)
+    shifts = np.linspace(-reach, reach, 2 * int(np.ceil(reach / p.step)) + 1)
+    turns = np.linspace(-turn, turn, 2 * int(np.ceil(turn / p.turn_step)) + 1)
+    dx, dy, dt = (a.ravel() for a in np.meshgrid(shifts, shifts, turns, indexing="ij"))
+    place = se2.transform_points(believed, middle) + np.column_stack([dx, dy])
+    angle = believed[2] + dt
+    c, s = np.cos(angle), np.sin(angle)
+    turned = np.column_stack([c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]])
+    return np.column_stack([place - turned, se2.wrap(angle)])
+
+
+def _proves(ranked: Sequence[Verdict], p: LoopParameters) -> bool:
+    """Whether the best verdict is good enough, and the next far enough behind."""
+    best = ranked[0]
+    rival = max((v.score for v in ranked[1:]), default=0.0)
+    return (
+        best.common >= p.min_common
+        and best.overlap >= p.min_overlap
+        and best.held >= p.min_held
+        and rival <= p.max_rival * best.score
+    )
+
+
+def _covariance(fit: Fit, p: LoopParameters) -> FloatArray:
+    """(3, 3) covariance of a closure, in the frame of the newer submap."""
+    turn = np.eye(3)
+    turn[:2, :2] = se2.rotation(fit.pose[2])
+    information = turn.T @ fit.information @ turn / p.residual**2 + 1e-6 * np.eye(3)
+    floor = np.diag([p.min_sigma**2, p.min_sigma**2, p.min_turn_sigma**2])
+    return np.asarray(np.linalg.inv(information) + floor)
