@@ -13,22 +13,38 @@ from mapweave_deploy.display import Lines
 from mapweave_deploy.launcher import Outcome, Plan, free_endpoint, run_team
 from mapweave_deploy.occupancy import grid_bytes
 from mapweave_deploy.roster import Member, team_from_logs
+from mapweave_protocol.codec import encode
+from mapweave_protocol.messages import MapMessage
 from tests.benchmarks.logs import find_logs
 from tests.benchmarks.tables import OUTPUT, format_table, write_json
 
-HEAD = ["robot", "scans", "map kB", "alignments kB", "status kB", "total kB", "B/scan"]
-HEAD += ["grid kB", "deflated kB", "grid/total", "deflated/total"]
+HEAD = ["robot", "scans", "maps", "maps kB", "alignments kB", "status kB", "total kB"]
+HEAD += ["map once kB", "grid once kB", "deflated kB"]
 
 
 @dataclass(frozen=True, slots=True)
 class Traffic:
-    """What one robot sent in all, and its scans as a grid, sent once [bytes]."""
+    """What one robot sent.
+
+    Attributes
+    ----------
+    scans, messages
+        That it mapped, and in how many map messages it said so.
+    maps, alignments, status
+        All of each kind that it sent, from first to last [bytes].
+    once
+        Its last map as one complete message [bytes].
+    grid, deflated
+        The same scans as an occupancy grid, plain and compressed [bytes].
+    """
 
     robot: str
     scans: int
+    messages: int
     maps: int
     alignments: int
     status: int
+    once: int
     grid: int
     deflated: int
 
@@ -70,9 +86,11 @@ def _count(outcome: Outcome, member: Member) -> Traffic:
     return Traffic(
         member.robot,
         outcome.recorder.statuses[member.robot].scans_seen,
+        sent["map"].messages,
         sent["map"].size,
         sent["alignment"].size,
         sent["status"].size,
+        len(encode(MapMessage.pack(outcome.maps[member.robot]))),
         plain,
         deflated,
     )
@@ -83,22 +101,13 @@ def tell(rows: Sequence[Traffic]) -> str:
     return "\n".join(
         [
             format_table(HEAD, [_row(row) for row in rows]),
-            "grid: the same scans as an occupancy grid with cells of 5 cm, sent once;"
-            " deflated: the same, compressed by zlib at its best. The messages are all that the"
-            " robot published from first to last.",
+            "All messages from first to last; the last map as one complete message; the same scans",
+            "as an occupancy grid with cells of 5 cm, once, plain and deflated by zlib at its best.",
         ]
     )
 
 
 def _row(row: Traffic) -> list[str]:
-    sizes = (row.maps, row.alignments, row.status, row.total)
-    return [
-        row.robot,
-        str(row.scans),
-        *(f"{size / 1000:.1f}" for size in sizes),
-        f"{row.total / row.scans:.0f}",
-        f"{row.grid / 1000:.0f}",
-        f"{row.deflated / 1000:.1f}",
-        f"{row.grid / row.total:.1f}",
-        f"{row.deflated / row.total:.2f}",
-    ]
+    sizes = (row.maps, row.alignments, row.status, row.total, row.once, row.grid, row.deflated)
+    counts = (str(row.scans), str(row.messages))
+    return [row.robot, *counts, *(f"{size / 1000:.1f}" for size in sizes)]
