@@ -19,7 +19,7 @@ from mapweave.scan import Scan
 from mapweave.scene import robot_scenes
 from tests.benchmarks.coverage import explained_share, returns_at
 from tests.benchmarks.logs import find_logs, load_scans
-from tests.benchmarks.mapping import merged_segments
+from tests.benchmarks.mapping import merge, segments_of
 from tests.benchmarks.runs import map_scans
 from tests.benchmarks.tables import OUTPUT, write_json
 from tests.benchmarks.truth import paths
@@ -89,7 +89,7 @@ def _simplify(scans: Sequence[Scan]) -> tuple[FloatArray, FloatArray, Simplifica
     path = paths(robot_map)[0]
     placed = [scans[k - scans[0].index] for k in path.index]
     before = _placed_segments(placed, path.pose)
-    after = merged_segments(robot_map, path.component)
+    after = segments_of(merge(robot_map), path.component)
     explained = explained_share(returns_at(placed, path.pose), after)
     figures = Simplification(len(scans), len(placed), len(before), len(after), explained)
     scene = next(

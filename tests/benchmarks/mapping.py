@@ -11,8 +11,8 @@ from mapweave.arrays import FloatArray
 from mapweave.assembly import assemble
 from mapweave.files import write_map
 from mapweave.joint import build_joint_map
-from mapweave.maps import RobotMap, component_name
-from mapweave.picture import draw_map
+from mapweave.maps import JointMap, RobotMap, component_name
+from mapweave.picture import draw_joint, draw_map
 from mapweave.scan import Scan
 from tests.benchmarks.coverage import explained_share, returns_at
 from tests.benchmarks.logs import Log, find_logs, load_scans, load_truth
@@ -99,14 +99,18 @@ def _measure(log: Log, folder: Path) -> Figures:
     file = folder / f"{log.name}.json"
     write_map(file, made.robot_map)
     draw_map(made.robot_map, folder / f"{log.name}.png", title=f"{log.name}, without odometry")
-    return _figures(log, scans, made, file.stat().st_size)
+    merged = merge(made.robot_map)
+    draw_joint(
+        merged, folder / f"{log.name}-merged.png", {"r1": made.robot_map}, f"{log.name}, merged"
+    )
+    return _figures(log, scans, made, merged, file.stat().st_size)
 
 
-def _figures(log: Log, scans: Sequence[Scan], made: Run, size: int) -> Figures:
+def _figures(log: Log, scans: Sequence[Scan], made: Run, merged: JointMap, size: int) -> Figures:
     stamps = np.array([scan.stamp for scan in scans])
     truth = load_truth(log, stamps)
     found = paths(made.robot_map)
-    lines = merged_segments(made.robot_map, found[0].component)
+    lines = segments_of(merged, found[0].component)
     right = steps_right(found, truth)
     return Figures(
         log=log.name,
@@ -126,11 +130,19 @@ def _figures(log: Log, scans: Sequence[Scan], made: Run, size: int) -> Figures:
     )
 
 
-def merged_segments(robot_map: RobotMap, component: int) -> FloatArray:
-    """Return the (n, 4) segments [m] of a component, its submaps merged into one map."""
-    name = component_name(robot_map.robot, component)
-    joint = build_joint_map({name: assemble(robot_map, component)}, [], version=1)
-    return joint.components[0].map.segments
+def merge(robot_map: RobotMap) -> JointMap:
+    """Return `robot_map` as the team would keep it: each component merged into one line map."""
+    names = {c: component_name(robot_map.robot, c) for c in robot_map.components}
+    return build_joint_map({names[c]: assemble(robot_map, c) for c in names}, [], version=1)
+
+
+def segments_of(merged: JointMap, component: int) -> FloatArray:
+    """Return the (n, 4) segments [m] of a component of the one robot in `merged`, its frame."""
+    return next(
+        each.map.segments
+        for each in merged.components
+        if any(name.endswith(f"/{component}") for name in each.robots)
+    )
 
 
 def _explained(path: Path2D, scans: Sequence[Scan], segments: FloatArray) -> float:

@@ -101,8 +101,8 @@ def tell(rows: Sequence[Traffic]) -> str:
     return "\n".join(
         [
             format_table(HEAD, [_row(row) for row in rows]),
-            "All messages from first to last; the last map as one complete message; the same scans",
-            "as an occupancy grid with cells of 5 cm, once, plain and deflated by zlib at its best.",
+            "All messages from first to last; the last map in one complete message; the scans as",
+            "an occupancy grid with cells of 5 cm, once, plain and deflated by zlib at its best.",
         ]
     )
 
