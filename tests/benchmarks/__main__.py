@@ -1,6 +1,7 @@
 """``python -m tests.benchmarks [figure2 | map | fusion | confidence | wire]``."""
 
 import argparse
+import io
 import sys
 import time
 from typing import Protocol
@@ -32,6 +33,8 @@ USUAL = ("figure2", "map", "fusion")
 
 def main() -> None:
     """Run the benchmark that was asked for, or the usual ones one after the other."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # whoever follows a file sees how far it is
     parser = _parser()
     asked = [sys.argv[1:]] if len(sys.argv) > 1 else [[name] for name in USUAL]
     if len(asked) > 1:
@@ -40,7 +43,7 @@ def main() -> None:
         options = parser.parse_args(arguments)
         start = time.monotonic()
         BENCHMARKS[options.benchmark].run(options)
-        print(f"{options.benchmark} took {time.monotonic() - start:.0f} s\n", flush=True)
+        print(f"{options.benchmark} took {time.monotonic() - start:.0f} s\n")
 
 
 def _parser() -> argparse.ArgumentParser:
