@@ -161,7 +161,8 @@ def _middle(submap: Submap) -> FloatArray:
 def _path_lengths(submaps: Sequence[Submap]) -> FloatArray:
     """(n,) path driven up to the end of each submap [m]."""
     steps = [np.diff(s.trajectory.pose[:, :2], axis=0) for s in submaps]
-    return np.cumsum([float(np.hypot(*step.T).sum()) for step in steps])
+    lengths: FloatArray = np.cumsum([float(np.hypot(*step.T).sum()) for step in steps])
+    return lengths
 
 
 def _around(believed: FloatArray, middle: FloatArray, path: float, p: LoopParameters) -> FloatArray:
@@ -178,7 +179,8 @@ def _around(believed: FloatArray, middle: FloatArray, path: float, p: LoopParame
     angle = believed[2] + dt
     c, s = np.cos(angle), np.sin(angle)
     turned = np.column_stack([c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]])
-    return np.column_stack([place - turned, se2.wrap(angle)])
+    poses: FloatArray = np.column_stack([place - turned, se2.wrap(angle)])
+    return poses
 
 
 def _proves(ranked: Sequence[Verdict], p: LoopParameters) -> bool:

@@ -42,15 +42,28 @@ class TrackerParameters(BaseModel):
     overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
     clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
     sight: float = Field(12.0, gt=0, description="[m] up to which seeing through counts")
+    max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
     motion_sigma: float = Field(0.5, gt=0, description="[m] of a step against constant velocity")
     turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
-    surprise: float = Field(0.05, ge=0, description="share of returns that one sigma² is worth")
+    surprise: float = Field(0.01, ge=0, description="share of returns that one sigma² is worth")
+    novelty: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="what a return at a new place counts, against an explained one;"
+        " at 0 a pose that shows nothing new would always win",
+    )
     convincing: float = Field(0.75, description="score above which no search is made")
     acceptable: float = Field(0.5, description="score above which a searched pose is taken")
     plausible: float = Field(0.25, description="score above which one without a rival is taken")
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+    open_direction: float = Field(
+        0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
+    )
+    open_reach: float = Field(1.2, gt=0, description="[m] searched along it, each way")
+    open_step: float = Field(0.2, gt=0, description="[m] between places tried")
     first_window: float = Field(1.15, gt=0, description="[rad] half the rotation searched first")
     min_points: int = Field(20, ge=3, description="a scan with fewer oriented points is blind")
 
@@ -72,6 +85,11 @@ class Evidence:
     explained: float
     contradicted: float
     seen_through: float
+
+    @property
+    def novel(self) -> float:
+        """Of the returns: where nobody looked before; they speak neither for nor against."""
+        return 1.0 - self.explained - self.contradicted
 
     @property
     def score(self) -> float:
@@ -159,11 +177,32 @@ class Tracker:
         ]
         found: list[Tracked] = []
         for enough, starts in stages:
-            found += [self._aligned(seen, start) for start in starts()]
-            best = max(found, key=lambda tracked: self._value(tracked, predicted))
-            if best.evidence.score >= enough:
-                return best
-        return best if self._stands_out(best, found) else None
+            found += [t for s in starts() if self._is_reached(t := self._aligned(seen, s))]
+            best = max(found, key=lambda t: self._value(t, predicted), default=None)
+            if best is not None and best.evidence.score >= enough:
+                return self._slid(seen, best, predicted)
+        return best if best is not None and self._stands_out(best, found) else None
+
+    def _is_reached(self, tracked: Tracked) -> bool:
+        """Whether a robot can have come to a pose since the last one; farther is a new start."""
+        return bool(np.hypot(*(tracked.pose - self.pose)[:2]) <= self.parameters.max_step)
+
+    def _slid(self, seen: Observation, tracked: Tracked, predicted: FloatArray) -> Tracked:
+        """Look along the direction that the walls leave open, if they leave one: a corridor.
+
+        Every place a bounded speed allows is tried; what both sides saw decides.
+        """
+        p = self.parameters
+        held, directions = np.linalg.eigh(tracked.information[:2, :2])
+        if held[0] > p.open_direction * held[1]:
+            return tracked
+        steps = np.arange(-p.open_reach, p.open_reach + 1e-9, p.open_step)
+        starts = np.tile(self.pose, (len(steps), 1))
+        starts[:, 2] = tracked.pose[2]
+        across = directions[:, 1] * (directions[:, 1] @ (tracked.pose - self.pose)[:2])
+        starts[:, :2] += across + steps[:, None] * directions[:, 0]
+        found = [t for s in starts if self._is_reached(t := self._aligned(seen, s))]
+        return max([tracked, *found], key=lambda t: self._value(t, predicted))
 
     def _stands_out(self, best: Tracked, found: list[Tracked]) -> bool:
         """Whether a weak pose, as at the edge of the known, has at least no rival."""
@@ -206,7 +245,8 @@ class Tracker:
         p = self.parameters
         x, y, turn = se2.between(predicted, tracked.pose)
         surprise = (x * x + y * y) / p.motion_sigma**2 + (turn / p.turn_sigma) ** 2
-        return tracked.evidence.score - p.surprise * min(4.0, float(surprise))
+        novelty = p.novelty * tracked.evidence.novel
+        return tracked.evidence.score + novelty - p.surprise * min(4.0, float(surprise))
 
     def _evidence(self, scan: Scan, surface: Surface, pose: FloatArray) -> Evidence:
         p = self.parameters
