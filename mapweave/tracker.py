@@ -45,7 +45,9 @@ class TrackerParameters(BaseModel):
     max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
     motion_sigma: float = Field(0.5, gt=0, description="[m] of a step against constant velocity")
     turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
-    surprise: float = Field(0.01, ge=0, description="share of returns that one sigma² is worth")
+    surprise: float = Field(
+        0.03, ge=0, description="share of returns that a motion e sigma² off is worth less"
+    )
     novelty: float = Field(
         0.5,
         ge=0,
@@ -244,9 +246,10 @@ class Tracker:
         """Evidence less surprise: corridors leave a direction open, and speed is bounded."""
         p = self.parameters
         x, y, turn = se2.between(predicted, tracked.pose)
-        surprise = (x * x + y * y) / p.motion_sigma**2 + (turn / p.turn_sigma) ** 2
-        novelty = p.novelty * tracked.evidence.novel
-        return tracked.evidence.score + novelty - p.surprise * min(4.0, float(surprise))
+        deviation = (x * x + y * y) / p.motion_sigma**2 + (turn / p.turn_sigma) ** 2
+        # Heavy-tailed: robots do turn on the spot between two scans, only not often.
+        surprise = p.surprise * np.log1p(deviation)
+        return float(tracked.evidence.score + p.novelty * tracked.evidence.novel - surprise)
 
     def _evidence(self, scan: Scan, surface: Surface, pose: FloatArray) -> Evidence:
         p = self.parameters
