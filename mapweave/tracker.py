@@ -124,6 +124,7 @@ class Tracker:
         self.parameters = parameters or TrackerParameters()
         self.pose: FloatArray = se2.IDENTITY
         self._motion: FloatArray = se2.IDENTITY
+        self._followed = True
         self._keyframes: deque[Keyframe] = deque(maxlen=self.parameters.keyframes)
         self._target: Target | None = None
         self._raster: NearnessRaster | None = None
@@ -142,6 +143,7 @@ class Tracker:
         if self.is_blind(seen):
             return None
         tracked = self._locate(seen, known) if self._keyframes else _first()
+        self._followed = tracked is not None
         if tracked is None:
             return None
         self._motion = se2.between(self.pose, tracked.pose) if self._keyframes else se2.IDENTITY
@@ -183,7 +185,9 @@ class Tracker:
             best = max(found, key=lambda t: self._value(t, predicted), default=None)
             if best is not None and best.evidence.score >= enough:
                 return self._slid(seen, best, predicted)
-        return best if best is not None and self._stands_out(best, found) else None
+        # After a scan that fitted nowhere the robot may be anywhere: a weak pose is worth nothing.
+        taken = best is not None and self._followed and self._stands_out(best, found)
+        return best if taken else None
 
     def _is_reached(self, tracked: Tracked) -> bool:
         """Whether a robot can have come to a pose since the last one; farther is a new start."""

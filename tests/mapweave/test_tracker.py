@@ -1,0 +1,127 @@
+"""Each scan is found from what was seen lately, or not placed at all."""
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.maps import LineMap
+from mapweave.observation import Observation, ObservationParameters, observe
+from mapweave.scan import Scan
+from mapweave.tracker import Tracked, Tracker
+from tests.mapweave.buildings import (
+    BUILDING,
+    FRONT,
+    OTHER_BUILDING,
+    cast,
+    corridor,
+    scans_along,
+    walls_of,
+)
+
+WALLS = walls_of(BUILDING)
+
+
+def observed(scan: Scan) -> Observation:
+    return observe(scan, ObservationParameters())
+
+
+def tracked_along(tracker: Tracker, scans: list[Scan]) -> list[Tracked | None]:
+    return [tracker.place(observed(scan), LineMap.empty) for scan in scans]
+
+
+def errors(found: list[Tracked | None], true: FloatArray) -> FloatArray:
+    """(n, 3) of poses in the first one's frame; NaN where none was found."""
+    there = se2.between(true[0], true)
+    poses = np.array([np.full(3, np.nan) if t is None else t.pose for t in found])
+    return se2.between(there, poses)
+
+
+def test_the_first_scan_defines_the_frame() -> None:
+    tracker = Tracker()
+    first = tracker.place(observed(cast(WALLS, [9, 1, 0.3])), LineMap.empty)
+    assert first is not None
+    np.testing.assert_array_equal(first.pose, np.zeros(3))
+    assert first.evidence.score == 1.0
+
+
+def test_a_walk_is_followed() -> None:
+    scans, true = scans_along(BUILDING, [(3, 1), (13, 1), (13, -3)], 1)
+    off = errors(tracked_along(Tracker(), scans), true)
+    assert np.hypot(*off[:, :2].T).max() < 0.15
+    assert np.degrees(np.abs(off[:, 2])).max() < 1
+
+
+def test_a_sudden_turn_on_the_spot_is_followed(rng: Generator) -> None:
+    """More than any motion model expects: shapes and the search over all turns find it."""
+    true = np.array([[13, 1, a] for a in (0.0, 0.1, 0.2, 1.6, 1.7)])
+    scans = [cast(WALLS, pose, index=k, noise=rng) for k, pose in enumerate(true)]
+    # Before, it looked around: what it will see is known.
+    around = [cast(WALLS, [13, 1, a], noise=rng) for a in np.linspace(0, 2 * np.pi, 13)]
+    tracker = Tracker()
+    tracked_along(tracker, around)
+    off = errors(tracked_along(tracker, scans), true)
+    assert np.hypot(*off[:, :2].T).max() < 0.1
+    assert np.degrees(np.abs(off[:, 2])).max() < 1
+
+
+def test_a_scan_of_another_place_is_not_placed(rng: Generator) -> None:
+    scans, _ = scans_along(BUILDING, [(3, 1), (9, 1)], 1)
+    tracker = Tracker()
+    tracked_along(tracker, scans)
+    before = tracker.pose
+    elsewhere = cast(walls_of(OTHER_BUILDING), [9, -3, 0.5], noise=rng)
+    assert tracker.place(observed(elsewhere), LineMap.empty) is None
+    np.testing.assert_array_equal(tracker.pose, before)
+
+
+@pytest.mark.parametrize("seen", [0, 15])
+def test_a_scan_that_shows_too_little_is_blind_and_not_placed(seen: int) -> None:
+    ranges = np.where(np.arange(len(FRONT)) < seen, 2.0, np.nan)
+    blind = observed(Scan(0, 0.0, FRONT, ranges))
+    tracker = Tracker()
+    assert tracker.is_blind(blind)
+    assert tracker.place(blind, LineMap.empty) is None
+    sighted = tracker.place(observed(cast(WALLS, [9, 1, 0])), LineMap.empty)
+    assert sighted is not None and (sighted.pose == 0).all()  # the blind one left no trace
+
+
+def test_in_a_bare_corridor_the_information_along_it_is_nearly_nil(rng: Generator) -> None:
+    bare = walls_of(corridor(80, [], []))
+    tracker = Tracker()
+    true = np.array([[x, 1.1, 0.0] for x in np.arange(30, 32, 0.3)])
+    found = tracked_along(tracker, [cast(bare, pose, noise=rng) for pose in true])
+    assert found[-1] is not None
+    information = found[-1].information
+    assert information[0, 0] < 0.02 * information[1, 1]
+
+
+def test_evidence_counts_for_and_against() -> None:
+    """Walls seen before explain a scan; a wall that went through free space is held against it."""
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, [9, 1.0, 0]), cast(WALLS, [9.4, 1.0, 0])])
+    again = tracker.place(observed(cast(WALLS, [9.2, 1.0, 0])), LineMap.empty)
+    assert again is not None
+    assert again.evidence.explained > 0.95
+    assert again.evidence.contradicted == pytest.approx(0, abs=0.01)
+    box = np.array([[11.0, 1.4, 11, 0.6]])  # faces the robot, in the middle of the corridor
+    blocked = tracker.place(observed(cast(np.vstack([WALLS, box]), [9.2, 1, 0])), LineMap.empty)
+    assert blocked is not None
+    assert blocked.evidence.contradicted > 0.05
+    assert blocked.evidence.score < again.evidence.score - 0.05
+
+
+def test_an_older_scan_is_placed_without_moving_the_track(rng: Generator) -> None:
+    scans, true = scans_along(BUILDING, [(3, 1), (9, 1)], 1)
+    tracker = Tracker()
+    tracked_along(tracker, scans)
+    before = tracker.pose
+    place = np.array([5.0, 1.2, 0.4])
+    older = cast(WALLS, place, noise=rng)
+    near = se2.between(true[0], se2.compose(place, [0.4, -0.3, 0.3]))
+    found = tracker.revisit(observed(older), near)
+    assert found is not None
+    off = se2.between(se2.between(true[0], place), found.pose)
+    assert np.hypot(off[0], off[1]) < 0.1 and abs(off[2]) < 0.02
+    np.testing.assert_array_equal(tracker.pose, before)
