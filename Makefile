@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: demo test test-all lint bench clean
+.PHONY: demo test test-all lint bench bench-map bench-fusion clean
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -30,6 +30,12 @@ test-all: lint
 
 bench: $(STAMP)
 	$(BIN)/python -m tests.benchmarks
+
+bench-map: $(STAMP)
+	$(BIN)/python -m tests.benchmarks map
+
+bench-fusion: $(STAMP)
+	$(BIN)/python -m tests.benchmarks fusion
 
 clean:
 	rm -rf .venv demo .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -16,11 +16,11 @@ class ConfidenceParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    intercept: float = Field(-16.0, description="log odds where all features are 0")
-    common: float = Field(2.0, description="for ln(1 + metres in common)")
-    overlap: float = Field(9.0, description="for the share in common")
-    held: float = Field(1.0, description="for ln(1 + metres that hold the weakest direction)")
-    margin: float = Field(5.0, description="for 1 - rival's score / score, in [0, 1]")
+    intercept: float = Field(-20.9, description="log odds where all features are 0")
+    common: float = Field(1.34, description="for ln(1 + metres in common)")
+    overlap: float = Field(15.9, description="for the share in common")
+    held: float = Field(0.559, description="for ln(1 + metres that hold the weakest direction)")
+    margin: float = Field(1.18, description="for 1 - rival's score / score, in [0, 1]")
 
 
 def features(best: Verdict, rival: Verdict | None) -> FloatArray:

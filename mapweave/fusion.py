@@ -48,6 +48,7 @@ class FusionParameters(BaseModel):
     min_complexity: float = Field(
         0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
     )
+    min_confidence: float = Field(0.6, gt=0, lt=1, description="of an accepted alignment")
     max_rival: float = Field(
         0.6, gt=0, lt=1, description="score of the best different hypothesis, as a share"
     )
@@ -120,13 +121,14 @@ def _compare(
     if not ranked:
         return _no_alignment(a, b, "no part of one has the shape of a part of the other")
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
-    decision, reason = decide(best, rival, p)
+    sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
+    decision, reason = decide(best, rival, sure, p)
     return Alignment(
         a,
         b,
         best.transform,
         decision,
-        confidence(best.verdict, rival.verdict if rival else None, p.confidence),
+        sure,
         reason,
         _numbers(best),
         None if rival is None else _runner_up(best, rival),
@@ -174,8 +176,10 @@ def _judged(
     )
 
 
-def decide(best: Hypothesis, rival: Hypothesis | None, p: FusionParameters) -> tuple[Decision, str]:
-    """Return the decision and one sentence that gives the reason."""
+def decide(
+    best: Hypothesis, rival: Hypothesis | None, sure: float, p: FusionParameters
+) -> tuple[Decision, str]:
+    """Return the decision and one sentence that gives the reason; `sure` is the confidence."""
     v = best.verdict
     found = f"{v.common:.0f} m of wall in common, {v.contradicted:.1f} m contradicted"
     if v.common < p.min_common:
@@ -190,6 +194,8 @@ def decide(best: Hypothesis, rival: Hypothesis | None, p: FusionParameters) -> t
         return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
     if best.complexity < p.min_complexity:
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
+    if sure < p.min_confidence:
+        return "ambiguous", f"{found}; too little to be sure ({sure:.0%})"
     if rival is None:
         return "accepted", f"{found}; nothing else fits"
     elsewhere = _elsewhere(best, rival)

@@ -10,6 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
@@ -19,6 +21,8 @@ from mapweave.map_raster import MapRaster, RasterParameters
 from mapweave.maps import Submap
 from mapweave.pose_graph import Link, optimise
 from mapweave.verification import Verdict, VerificationParameters, coarse_scores, verify
+
+CLOSURE_LENGTH = 2.0  # [m] of tracked path that errs about as much as a closure
 
 
 class LoopParameters(BaseModel):
@@ -32,10 +36,10 @@ class LoopParameters(BaseModel):
     icp: IcpParameters = IcpParameters(start_scale=0.4, end_scale=0.05)
     candidates: int = Field(8, ge=1, description="older submaps compared, the nearest")
     reach: float = Field(12.0, gt=0, description="[m] between the middles of submaps compared")
-    drift: float = Field(0.01, gt=0, description="[m/m] of path, the most that is expected")
+    drift: float = Field(0.02, gt=0, description="[m/m] of path, the most that is expected")
     min_drift: float = Field(0.6, gt=0, description="[m] searched at the least")
     max_drift: float = Field(4.0, gt=0, description="[m] searched at the most")
-    turn_drift: float = Field(0.001, gt=0, description="[rad/m] of path, the most expected")
+    turn_drift: float = Field(0.002, gt=0, description="[rad/m] of path, the most expected")
     min_turn: float = Field(0.06, gt=0, description="[rad] searched at the least")
     max_turn: float = Field(0.26, gt=0, description="[rad] searched at the most: 15°")
     step: float = Field(0.3, gt=0, description="[m] between hypotheses")
@@ -92,23 +96,35 @@ class LoopCloser:
         return self._fitted(submaps)
 
     def _closures_of(self, submaps: Sequence[Submap]) -> list[Link]:
+        p = self._parameters
         *older, newest = submaps
         if len(newest.map.segments) == 0:
             return []
+        paths = self._chain_lengths(submaps)
         here = _middle(newest)
         near = [
-            (float(np.hypot(*(_middle(s) - here))), s)
-            for s in older[:-1]
-            if s.component == newest.component and len(s.map.segments)
+            (distance, path, s)
+            for s, path in zip(older[:-1], paths, strict=False)
+            if s.component == newest.component
+            and len(s.map.segments)
+            and (distance := float(np.hypot(*(_middle(s) - here)))) < p.reach + _drift(path, p)
         ]
-        chosen = sorted(near, key=lambda item: item[0])[: self._parameters.candidates]
-        paths = _path_lengths(submaps)
-        links = [
-            self._compare(s, newest, paths[-1] - paths[k])
-            for k, s in enumerate(older)
-            if any(s is c and d < self._parameters.reach for d, c in chosen)
-        ]
+        nearest = sorted(near, key=lambda item: item[0])[: p.candidates]
+        links = [self._compare(s, newest, path) for _, path, s in nearest]
         return [link for link in links if link is not None]
+
+    def _chain_lengths(self, submaps: Sequence[Submap]) -> FloatArray:
+        """(n,) [m] of tracked path by which each submap is known relative to the last one.
+
+        Along the shortest chain of links: a closure shortens it, and with it the drift.
+        """
+        lengths = {s.id: _path_length(s) for s in submaps}
+        links = [*self._tracking, *self._closures]
+        weight = [lengths[k.second] if k.trusted else CLOSURE_LENGTH for k in links]
+        ends = ([k.first for k in links], [k.second for k in links])
+        graph = csr_array((weight, ends), shape=(len(submaps), len(submaps)))
+        chain: FloatArray = dijkstra(graph, directed=False, indices=submaps[-1].id)
+        return chain
 
     def _compare(self, older: Submap, newest: Submap, path: float) -> Link | None:
         """Return the link from `older` to `newest`, where what both saw proves one."""
@@ -155,14 +171,17 @@ class LoopCloser:
 
 def _middle(submap: Submap) -> FloatArray:
     """(2,) middle of a submap's path, component frame [m]."""
-    return se2.transform_points(submap.pose, submap.trajectory.pose[:, :2]).mean(axis=0)
+    path = se2.transform_points(submap.pose, submap.trajectory.pose[:, :2])
+    return np.asarray(path.mean(axis=0))
 
 
-def _path_lengths(submaps: Sequence[Submap]) -> FloatArray:
-    """(n,) path driven up to the end of each submap [m]."""
-    steps = [np.diff(s.trajectory.pose[:, :2], axis=0) for s in submaps]
-    lengths: FloatArray = np.cumsum([float(np.hypot(*step.T).sum()) for step in steps])
-    return lengths
+def _path_length(submap: Submap) -> float:
+    return float(np.hypot(*np.diff(submap.trajectory.pose[:, :2], axis=0).T).sum())
+
+
+def _drift(path: float, p: LoopParameters) -> float:
+    """[m] that a pose may have drifted on a tracked path [m]."""
+    return min(max(p.min_drift, p.drift * path), p.max_drift)
 
 
 def _around(believed: FloatArray, middle: FloatArray, path: float, p: LoopParameters) -> FloatArray:
@@ -170,7 +189,7 @@ def _around(believed: FloatArray, middle: FloatArray, path: float, p: LoopParame
 
     Turns are about `middle` (2,), the middle of what is turned, so that they do not shift it.
     """
-    reach = min(max(p.min_drift, p.drift * path), p.max_drift)
+    reach = _drift(path, p)
     turn = min(max(p.min_turn, p.turn_drift * path), p.max_turn)
     shifts = np.linspace(-reach, reach, 2 * int(np.ceil(reach / p.step)) + 1)
     turns = np.linspace(-turn, turn, 2 * int(np.ceil(turn / p.turn_step)) + 1)
