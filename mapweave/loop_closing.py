@@ -123,7 +123,8 @@ class LoopCloser:
         weight = [lengths[k.second] if k.trusted else CLOSURE_LENGTH for k in links]
         ends = ([k.first for k in links], [k.second for k in links])
         graph = csr_array((weight, ends), shape=(len(submaps), len(submaps)))
-        return dijkstra(graph, directed=False, indices=[submaps[-1].id])[0]
+        chains: FloatArray = dijkstra(graph, directed=False, indices=[submaps[-1].id])
+        return np.asarray(chains[0])
 
     def _compare(self, older: Submap, newest: Submap, path: float) -> Link | None:
         """Return the link from `older` to `newest`, where what both saw proves one."""

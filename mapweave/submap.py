@@ -93,9 +93,7 @@ class GrowingSubmap:
 
     def line_map(self) -> LineMap:
         """Return the lines and the free space seen so far."""
-        if self._cleared:
-            self._cleared = [unite(self._cleared, self._parameters.free_space)]
-        outlines = rings(self._cleared[0]) if self._cleared else ()
+        outlines = rings(unite(self._cleared, self._parameters.free_space))
         return replace(self.lines(), free_space=outlines)
 
     def lines(self) -> LineMap:

@@ -1,0 +1,139 @@
+"""The program finds its subcommands by entry point, and turns errors into a line and a status."""
+
+import sys
+from collections.abc import Callable
+from importlib.metadata import entry_points, version
+from pathlib import Path
+
+import pytest
+
+from mapweave import cli
+from mapweave.cli import main
+from mapweave.errors import FileError, InvalidIdError, MissingExtraError
+
+
+@pytest.fixture
+def offer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Return what installs a distribution that offers ``mapweave try``, which runs a statement."""
+
+    def install(statement: str) -> None:
+        (tmp_path / "tried.py").write_text(
+            "from mapweave.cli import Command\n"
+            "from mapweave.errors import *\n"
+            "def run(options):\n"
+            f"    {statement}\n"
+            "command = Command('Try it.', lambda parser: None, run)\n"
+        )
+        facts = tmp_path / "tried-1.0.dist-info"
+        facts.mkdir()
+        (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: tried\nVersion: 1.0\n")
+        (facts / "entry_points.txt").write_text("[mapweave.commands]\ntry = tried:command\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.delitem(sys.modules, "tried", raising=False)
+
+    return install
+
+
+def test_every_package_contributes_its_commands() -> None:
+    names = {point.name for point in entry_points(group=cli.COMMAND_GROUP)}
+    assert {"map", "fuse", "export", "watch", "agent", "server", "router", "team"} <= names
+
+
+def test_help_lists_every_command_with_its_summary(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    said = capsys.readouterr()
+    for point in entry_points(group=cli.COMMAND_GROUP):
+        assert f"  {point.name:<8} {point.load().summary}\n" in said.out
+    assert said.err == ""
+
+
+def test_without_a_command_the_overview_goes_to_standard_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main([]) == cli.EXIT_USAGE
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.startswith("usage: mapweave COMMAND")
+
+
+def test_the_version_is_that_of_the_distribution(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"mapweave {version('mapweave')}\n"
+
+
+def test_an_unknown_command_is_wrong_usage_and_the_known_ones_are_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["frobnicate"]) == cli.EXIT_USAGE
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "'frobnicate'" in said and "export, fuse, map" in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["map"],
+        ["fuse"],
+        ["export", "one.json"],
+        ["map", "log", "--scans", "9:3"],
+        ["map", "log", "--scans", "3"],
+        ["map", "log", "--scans=-2:3"],
+        ["map", "log", "--odometry", "x"],
+        ["map", "log", "--frobnicate"],
+    ],
+    ids=" ".join,
+)
+def test_wrong_usage_exits_with_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == cli.EXIT_USAGE
+    assert "usage: mapweave" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("statement", "line"),
+    [
+        ("raise FileError('a.json', 'is empty')", "mapweave: a.json: is empty\n"),
+        (
+            "raise MissingExtraError('A picture', 'plot')",
+            "mapweave: A picture needs an optional package: pip install 'mapweave[plot]'\n",
+        ),
+        ("raise MapweaveError('no')", "mapweave: no\n"),
+    ],
+)
+def test_an_error_is_one_line_and_exit_status_1(
+    statement: str,
+    line: str,
+    offer: Callable[[str], None],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    offer(statement)
+    assert main(["try"]) == cli.EXIT_FAILED
+    assert capsys.readouterr() == ("", line)
+
+
+def test_an_interruption_is_said_and_has_the_shells_status(
+    offer: Callable[[str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    offer("raise KeyboardInterrupt")
+    assert main(["try"]) == cli.EXIT_INTERRUPTED == 130
+    assert capsys.readouterr().err == "mapweave: interrupted\n"
+
+
+def test_a_defect_is_not_hidden(offer: Callable[[str], None]) -> None:
+    """Only errors raised on purpose become a line; a bug keeps its traceback."""
+    offer("return 1 // 0")
+    with pytest.raises(ZeroDivisionError):
+        main(["try"])
+
+
+def test_the_status_a_command_returns_is_the_programs(offer: Callable[[str], None]) -> None:
+    offer("return 3")
+    assert main(["try"]) == 3
+
+
+def test_errors_carry_what_they_are_about() -> None:
+    error = FileError("a/b.json", "is empty")
+    assert (error.path, error.problem) == (Path("a/b.json"), "is empty")
+    assert InvalidIdError("robot", "A").name == "A"
+    assert MissingExtraError("A picture", "plot").extra == "plot"
