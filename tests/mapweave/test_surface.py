@@ -55,27 +55,6 @@ def test_every_return_up_to_the_range_becomes_a_point_and_no_other(rng: Generato
     assert (seen.polyline >= 0).sum() == near.sum()
 
 
-def test_the_lines_of_an_observation_are_the_scans_segments_by_polyline(rng: Generator) -> None:
-    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND, noise=rng)
-    seen = observe(scan, ObservationParameters())
-    found = extract_segments(scan).segments
-    np.testing.assert_array_equal(np.unique(seen.lines.segments, axis=0), np.unique(found, axis=0))
-    assert set(np.diff(seen.lines.polyline)) <= {0, 1}
-    assert (seen.lines.support == 1).all()
-
-
-def test_a_points_polyline_is_that_of_the_line_it_lies_on(rng: Generator) -> None:
-    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND, noise=rng)
-    seen = observe(scan, ObservationParameters())
-    lines = seen.lines
-    for polyline in np.unique(lines.polyline):
-        points = seen.surface.points[seen.surface.polyline == polyline]
-        own = lines.segments[lines.polyline == polyline]
-        normals = left_normals(own[:, 2:] - own[:, :2])
-        across = np.abs(np.einsum("psj,sj->ps", points[:, None] - own[None, :, :2], normals))
-        assert (across.min(axis=1) < 0.15).all()
-
-
 def test_a_line_is_sampled_evenly_and_even_a_short_one_once() -> None:
     lines = line_map(np.array([[0.0, 0, 2, 0], [5, 5, 5, 5.01]]))
     surface, owner = line_surface(lines, 0.5)
@@ -97,9 +76,3 @@ def test_joined_surfaces_keep_all_their_points() -> None:
     both = join_surfaces([one, one.at(slice(0, 3))])
     assert len(both) == len(one) + 3
     np.testing.assert_array_equal(both.normals[-3:], one.normals[:3])
-
-
-def test_a_scan_that_shows_nothing_has_no_surface() -> None:
-    blind = cast(ROOM, [1, 2, 0], max_range=0.5)
-    seen = observe(blind, ObservationParameters())
-    assert len(seen.surface) == 0 and len(seen.lines.segments) == 0
