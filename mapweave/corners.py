@@ -39,7 +39,8 @@ class Corners:
     Attributes
     ----------
     frame
-        (k, 3) meeting point and mean direction of the two walls, turned to the first's [m, rad].
+        (k, 3) the point where the lines of the two walls meet, and the first wall's direction
+        [m, m, rad].
     angle
         (k,) from the first wall's direction to the second's [rad].
     weight
