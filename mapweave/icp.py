@@ -2,8 +2,8 @@
 
 The paper extends ICP [5] to respect the correspondence of polylines. Here a point finds its
 partner among points with a like normal, seen from the same side, which rules out partners
-around corners and behind walls; and, where corresponding polylines are known, only among the
-points of those. Distances are measured along the partner's normal, because a wall holds a point
+around corners and behind walls; and, where corresponding polylines are known, a pair on two
+that do not correspond does not pull. Distances are measured along the partner's normal, because a wall holds a point
 across it and not along it.
 """
 
@@ -97,8 +97,10 @@ def align(
         (3, 3) information [1/m², 1/rad²] that holds the pose at `start`; decides the directions
         that the surfaces leave open.
     corresponding
-        (target's polylines, moving one's polylines) which may be partners; all points may where
-        it is not given, and points on no polyline have no part where it is.
+        (target's polylines, moving one's polylines) which pairs of polylines may pull. A point's
+        partner is its nearest of all; where the polylines of the two do not correspond, or
+        either is on none, the pair is left out, and no farther partner is looked for. Without
+        it all pairs pull.
     """
     pose = np.array(start, dtype=float)
     held = np.zeros((3, 3)) if prior is None else prior
