@@ -1,7 +1,9 @@
 """Confidence: the probability that an alignment is right within 0.5 m and 5°.
 
 A logistic model of a few numbers of the evidence, fitted offline by
-``tests/benchmarks/fit_confidence.py``.
+``tests/benchmarks/fit_confidence.py``, says how probably the evidence comes from one place seen
+twice. Where a different transform has evidence of its own, that probability is shared between the
+two: in a building that half a turn maps onto itself, each is right half of the time.
 """
 
 import numpy as np
@@ -12,7 +14,7 @@ from mapweave.verification import Verdict
 
 
 class ConfidenceParameters(BaseModel):
-    """Coefficients of the logistic model, one for each of `features`."""
+    """Coefficients of the logistic model, one for each of `features`, and the rival's share."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -21,23 +23,46 @@ class ConfidenceParameters(BaseModel):
     overlap: float = Field(15.9, description="for the share in common")
     held: float = Field(0.559, description="for ln(1 + metres that hold the weakest direction)")
     margin: float = Field(1.18, description="for 1 - rival's score / score, in [0, 1]")
+    rivalry: float = Field(
+        12.0,
+        gt=0,
+        description="power of score / rival's score that gives the odds between the two: at nine"
+        " tenths of the score a rival is a quarter as probable; most likely on the same pairs,"
+        " few of which tell",
+    )
 
 
 def features(best: Verdict, rival: Verdict | None) -> FloatArray:
     """Return (4,) what the model looks at: common, overlap, held, margin."""
-    rivalry = 0.0 if rival is None else rival.score / max(best.score, 1e-9)
     return np.array(
         [
             np.log1p(max(best.common, 0.0)),
             best.overlap,
             np.log1p(max(best.held, 0.0)),
-            1.0 - min(max(rivalry, 0.0), 1.0) if best.score > 0 else 0.0,
+            1.0 - _rivalry(best, rival) if best.score > 0 else 0.0,
         ]
     )
+
+
+def share(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
+    """Return the part, in [1/2, 1], that the best hypothesis has in what it shares with its rival.
+
+    Their odds are a power of the ratio of their scores: what two maps are bent against each other
+    costs a part of the score, whatever its size.
+    """
+    return float(1 / (1 + _rivalry(best, rival) ** parameters.rivalry))
 
 
 def confidence(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
     """Return the probability that the best hypothesis is right, in (0, 1)."""
     p = parameters
     slopes = np.array([p.common, p.overlap, p.held, p.margin])
-    return float(1 / (1 + np.exp(-(p.intercept + slopes @ features(best, rival)))))
+    either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best, rival))))
+    return float(either * share(best, rival, p))
+
+
+def _rivalry(best: Verdict, rival: Verdict | None) -> float:
+    """Score of the rival as a share of the best one's, in [0, 1]; 0 where there is none."""
+    if rival is None:
+        return 0.0
+    return min(max(rival.score / max(best.score, 1e-9), 0.0), 1.0)

@@ -194,14 +194,17 @@ def decide(
         return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
     if best.complexity < p.min_complexity:
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
+    if rival is not None and rival.verdict.score > p.max_rival * v.score:
+        elsewhere = _elsewhere(best, rival)
+        return "ambiguous", f"{found}; but {elsewhere} explains {rival.verdict.score:.0f} m as well"
     if sure < p.min_confidence:
         return "ambiguous", f"{found}; too little to be sure ({sure:.0%})"
     if rival is None:
         return "accepted", f"{found}; nothing else fits"
-    elsewhere = _elsewhere(best, rival)
-    if rival.verdict.score > p.max_rival * v.score:
-        return "ambiguous", f"{found}; but {elsewhere} explains {rival.verdict.score:.0f} m as well"
-    return "accepted", f"{found}; next best, {elsewhere}, explains {_explains(rival.verdict)}"
+    return (
+        "accepted",
+        f"{found}; next best, {_elsewhere(best, rival)}, explains {_explains(rival.verdict)}",
+    )
 
 
 def _explains(verdict: Verdict) -> str:

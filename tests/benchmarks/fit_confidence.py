@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mapweave.arrays import BoolArray, FloatArray
-from mapweave.confidence import ConfidenceParameters, features
+from mapweave.confidence import ConfidenceParameters, features, share
 from mapweave.verification import Verdict, VerificationParameters
 from tests.benchmarks.fusion import ROWS
 from tests.benchmarks.logistic import (
@@ -30,7 +30,7 @@ from tests.benchmarks.logistic import (
 from tests.benchmarks.tables import OUTPUT, format_table, write_json
 
 MAX_BEND = 0.5  # [m] rms of the maps that the model is fitted to
-NAMES = [name for name in ConfidenceParameters.model_fields if name != "intercept"]
+NAMES = ("common", "overlap", "held", "margin")  # of the slopes, as in `features`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +41,8 @@ class Examples:
     ----------
     features
         (n, k) what the model looks at.
+    share
+        (n,) of the probability, left by the rival.
     right
         (n,)
     accepted
@@ -52,6 +54,7 @@ class Examples:
     """
 
     features: FloatArray
+    share: FloatArray
     right: BoolArray
     accepted: BoolArray
     bend: FloatArray
@@ -79,7 +82,7 @@ def run(options: argparse.Namespace) -> None:
     """Report on held-out buildings, then fit on all and print what to paste."""
     examples = read_examples(options.rows)
     held_out = predict_held_out(examples)
-    present = _present_model().predict(examples.features)
+    present = _present_model().predict(examples.features) * examples.share
     for name, said in (("present coefficients", present), ("fitted, held out", held_out)):
         print(tell(name, said, examples))
     bins = reliability(held_out, examples.right)
@@ -97,8 +100,10 @@ def run(options: argparse.Namespace) -> None:
 def read_examples(file: Path) -> Examples:
     """Read the rows that `fusion` wrote; pairs without any hypothesis teach nothing."""
     rows = [row for row in json.loads(file.read_text()) if row["evidence"]]
+    verdicts = [_verdicts(row) for row in rows]
     return Examples(
-        np.array([features(*_verdicts(row)) for row in rows]),
+        np.array([features(*pair) for pair in verdicts]),
+        np.array([share(*pair, ConfidenceParameters()) for pair in verdicts]),
         np.array([row["right"] for row in rows], dtype=np.bool_),
         np.array([row["decision"] == "accepted" for row in rows], dtype=np.bool_),
         np.array([max(row["bends"]) for row in rows]),
@@ -128,7 +133,7 @@ def predict_held_out(examples: Examples) -> FloatArray:
         seen = ~(examples.touches(pair[0]) | examples.touches(pair[1]))
         model = _fit(examples, seen & examples.sound)
         said[asked] = model.predict(examples.features[asked])
-    return said
+    return said * examples.share
 
 
 def _fit(examples: Examples, chosen: BoolArray) -> Logistic:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mapweave.confidence import ConfidenceParameters, confidence, features
+from mapweave.confidence import ConfidenceParameters, confidence, features, share
+from mapweave.fusion import FusionParameters
 from mapweave.verification import Verdict
 
 P = ConfidenceParameters()
@@ -19,10 +20,10 @@ def test_it_is_a_probability_even_for_nonsense() -> None:
         assert 0 <= confidence(best, None, P) <= 1
 
 
-def test_it_is_the_logistic_function_of_the_features() -> None:
-    best, rival = verdict(30, 2), verdict(12, 3)
-    odds = P.intercept + features(best, rival) @ [P.common, P.overlap, P.held, P.margin]
-    assert confidence(best, rival, P) == pytest.approx(1 / (1 + np.exp(-odds)))
+def test_without_a_rival_it_is_the_logistic_function_of_the_features() -> None:
+    best = verdict(30, 2)
+    odds = P.intercept + features(best, None) @ [P.common, P.overlap, P.held, P.margin]
+    assert confidence(best, None, P) == pytest.approx(1 / (1 + np.exp(-odds)), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -47,3 +48,23 @@ def test_a_strong_rival_lowers_it_and_a_hopeless_one_counts_as_none() -> None:
 
 def test_a_hypothesis_more_contradicted_than_matched_has_no_margin() -> None:
     assert features(verdict(3, 9), None)[3] == 0
+
+
+@pytest.mark.parametrize("common", [8.0, 60.0, 1e5])
+def test_a_rival_as_good_is_as_probable_however_much_speaks_for_both(common: float) -> None:
+    best = verdict(common, held=common / 3)
+    assert share(best, best, P) == 0.5
+    assert confidence(best, best, P) <= 0.5
+    assert confidence(verdict(1e5, held=1e5), verdict(1e5, held=1e5), P) == pytest.approx(0.5, 1e-3)
+
+
+def test_the_odds_between_two_depend_on_the_ratio_of_their_scores() -> None:
+    for size in (5.0, 50.0, 500.0):
+        part = share(verdict(size), verdict(0.9 * size), P)
+        assert part / (1 - part) == pytest.approx(0.9**-P.rivalry)
+
+
+def test_a_rival_that_leaves_an_alignment_accepted_costs_it_little() -> None:
+    most = FusionParameters().max_rival
+    assert share(verdict(20), verdict(20 * most), P) > 0.99
+    assert share(verdict(20), None, P) == share(verdict(20), verdict(1, 9), P) == 1
