@@ -52,6 +52,8 @@ def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> Ba
     """Return the union of `pieces`, its outline simplified, crumbs left out."""
     union = shapely.union_all(list(pieces))
     # Opened: a view through a crack clears nothing that would matter, and costs many vertices.
+    if union.is_empty:
+        return union
     width = parameters.min_width / 2
     opened = union.buffer(-width, join_style="mitre").buffer(width, join_style="mitre")
     union = shapely.simplify(opened, parameters.simplification)

@@ -9,6 +9,7 @@ import numpy as np
 from mapweave import se2
 from mapweave.arrays import FloatArray, IntArray
 from mapweave.assembly import assemble
+from mapweave.confidence import percent
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, component_name
 
 
@@ -75,9 +76,7 @@ def tell_confidence(scene: Scene) -> list[str]:
     """Return the confidence in words; nothing where no two robots had to be joined."""
     if scene.confidence is None or len(scene.robots) < 2:
         return []
-    # Rounded, 0.996 would read as certain.
-    sure = scene.confidence >= 0.995
-    return [f"confidence {'over 99%' if sure else f'{scene.confidence:.0%}'}"]
+    return [f"confidence {percent(scene.confidence)}"]
 
 
 def robot_scenes(robot_map: RobotMap) -> list[Scene]:

@@ -1,12 +1,12 @@
 """Tracking: each scan against what was seen lately, from scans alone.
 
-Predict, align, and judge by all that both sides saw: returns that lie on known surfaces speak
-for a pose; returns inside what earlier scans saw through, and known surfaces that the new scan
-sees through, speak against it. Where the predicted pose does not convince, every motion in a
-window is searched; where that does not convince either, the scan is not placed.
+Predict, align, and judge by all that both sides saw. Where the predicted pose does not convince,
+every motion in a window is searched; where that does not convince either, the scan is not placed.
+
+Odometry, where a scan has it, is one more prediction beside constant velocity: it may say where to
+look first, and what would surprise least, but what was seen decides.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,15 +14,14 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
-from mapweave.arrays import BoolArray, FloatArray
+from mapweave.arrays import FloatArray
 from mapweave.correspondence import CorrespondenceParameters, correspond
-from mapweave.icp import Fit, IcpParameters, Target, align, partners
+from mapweave.icp import Target, align
+from mapweave.local_map import Evidence, LocalMap, LocalMapParameters
 from mapweave.maps import LineMap
 from mapweave.observation import Observation
 from mapweave.scan import Scan
-from mapweave.search import NearnessRaster, SearchParameters, search
-from mapweave.surface import Surface, join_surfaces, line_surface
-from mapweave.visibility import seen_through
+from mapweave.surface import line_surface
 
 
 class TrackerParameters(BaseModel):
@@ -30,18 +29,10 @@ class TrackerParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    icp: IcpParameters = IcpParameters()
-    search: SearchParameters = SearchParameters()
+    local_map: LocalMapParameters = LocalMapParameters()
     correspondence: CorrespondenceParameters = CorrespondenceParameters()
     line_spacing: float = Field(0.1, gt=0, description="[m] between points on the map's lines")
-    keyframes: int = Field(60, ge=1, description="how many are remembered: some 15-20 m of path")
-    keyframe_step: float = Field(0.3, gt=0, description="[m] of motion that makes a new one")
-    keyframe_turn: float = Field(0.26, gt=0, description="[rad] of rotation that makes one: 15°")
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
-    witnesses: int = Field(12, ge=1, description="nearest keyframes asked what they saw through")
-    overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
-    clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
-    sight: float = Field(12.0, gt=0, description="[m] up to which seeing through counts")
     max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
     motion_sigma: float = Field(0.5, gt=0, description="[m] of a step against constant velocity")
     turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
@@ -71,50 +62,12 @@ class TrackerParameters(BaseModel):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
-    """What speaks for and against the pose of a scan, as shares in [0, 1].
-
-    Attributes
-    ----------
-    explained
-        Of the returns: on known surfaces.
-    contradicted
-        Of the returns: where earlier scans saw free space.
-    seen_through
-        Of the known surface points in sight: where this scan saw free space.
-    """
-
-    explained: float
-    contradicted: float
-    seen_through: float
-
-    @property
-    def novel(self) -> float:
-        """Of the returns: where nobody looked before; they speak neither for nor against."""
-        return 1.0 - self.explained - self.contradicted
-
-    @property
-    def score(self) -> float:
-        """For minus against."""
-        return self.explained - self.contradicted - self.seen_through
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
     """A pose found for a scan: where, how sure, and which directions are held."""
 
     pose: FloatArray
     evidence: Evidence
     information: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Keyframe:
-    """A remembered scan at its pose (3,), with its surface in the tracking frame."""
-
-    scan: Scan
-    pose: FloatArray
-    surface: Surface
 
 
 class Tracker:
@@ -124,10 +77,9 @@ class Tracker:
         self.parameters = parameters or TrackerParameters()
         self.pose: FloatArray = se2.IDENTITY
         self._motion: FloatArray = se2.IDENTITY
+        self._odometry: FloatArray | None = None
         self._followed = True
-        self._keyframes: deque[Keyframe] = deque(maxlen=self.parameters.keyframes)
-        self._target: Target | None = None
-        self._raster: NearnessRaster | None = None
+        self._local = LocalMap(self.parameters.local_map)
 
     def place(self, seen: Observation, known: Callable[[], LineMap]) -> Tracked | None:
         """Find the pose of a scan; None where it fits nowhere.
@@ -142,14 +94,14 @@ class Tracker:
         """
         if self.is_blind(seen):
             return None
-        tracked = self._locate(seen, known) if self._keyframes else _first()
+        tracked = _first() if self._local.is_empty else self._locate(seen, known)
         self._followed = tracked is not None
         if tracked is None:
             return None
-        self._motion = se2.between(self.pose, tracked.pose) if self._keyframes else se2.IDENTITY
+        self._motion = se2.between(self.pose, tracked.pose)
+        self._odometry = seen.scan.odometry
         self.pose = tracked.pose
-        if self._is_news(tracked.pose):
-            self._remember(Keyframe(seen.scan, tracked.pose, seen.surface.moved(tracked.pose)))
+        self._local.remember(seen.scan, seen.surface, tracked.pose)
         return tracked
 
     def is_blind(self, seen: Observation) -> bool:
@@ -159,9 +111,9 @@ class Tracker:
     def revisit(self, seen: Observation, near: FloatArray) -> Tracked | None:
         """Find the pose of an older scan about `near` (3,), leaving the track as it is."""
         p = self.parameters
-        starts = search(seen.surface.points, self._nearness(near), near, np.pi, p.search)
+        starts = self._local.search(seen.surface.points, near, np.pi)
         found = [self._aligned(seen, start) for start in np.vstack([near, starts])]
-        best = max(found, key=lambda tracked: self._value(tracked, near))
+        best = max(found, key=lambda tracked: self._value(tracked, near[None]))
         return best if best.evidence.score >= p.acceptable else None
 
     def forget_motion(self) -> None:
@@ -171,13 +123,13 @@ class Tracker:
     def _locate(self, seen: Observation, known: Callable[[], LineMap]) -> Tracked | None:
         """Try what is likely first, then what shapes propose, then everything within reach."""
         p = self.parameters
-        predicted = se2.compose(self.pose, self._motion)
+        predicted = self._predictions(seen.scan)
         points = seen.surface.points
         stages: list[tuple[float, Callable[[], FloatArray]]] = [
-            (p.convincing, lambda: np.stack([predicted, self.pose])),
+            (p.convincing, lambda: np.vstack([predicted, self.pose])),
             (p.convincing, lambda: self._shape_starts(seen, known())),
-            (p.convincing, lambda: self._window(points, predicted, p.first_window)),
-            (p.acceptable, lambda: self._window(points, predicted, np.pi)),
+            (p.convincing, lambda: self._local.search(points, predicted[0], p.first_window)),
+            (p.acceptable, lambda: self._local.search(points, predicted[0], np.pi)),
         ]
         found: list[Tracked] = []
         for enough, starts in stages:
@@ -188,6 +140,13 @@ class Tracker:
         # After a scan that fitted nowhere the robot may be anywhere: a weak pose is worth nothing.
         taken = best is not None and self._followed and self._stands_out(best, found)
         return best if taken else None
+
+    def _predictions(self, scan: Scan) -> FloatArray:
+        """(k, 3) where the robot may be by now: by its odometry, and at constant velocity."""
+        steps = [self._motion]
+        if scan.odometry is not None and self._odometry is not None:
+            steps.insert(0, se2.between(self._odometry, scan.odometry))
+        return se2.compose(self.pose, np.stack(steps))
 
     def _is_reached(self, tracked: Tracked) -> bool:
         """Whether a robot can have come to a pose since the last one; farther is a new start."""
@@ -221,9 +180,6 @@ class Tracker:
         margin = best.evidence.score - max(rivals, default=-1.0)
         return best.evidence.score >= p.plausible and margin >= p.margin
 
-    def _window(self, points: FloatArray, centre: FloatArray, turn: float) -> FloatArray:
-        return search(points, self._nearness(centre), centre, turn, self.parameters.search)
-
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
         p = self.parameters
@@ -231,9 +187,9 @@ class Tracker:
         starts = []
         for found in correspond(known, seen.lines, p.correspondence):
             partners_of = np.flatnonzero(found.corresponding.any(axis=1))
-            target = Target.of(surface.at(np.isin(surface.polyline, partners_of)), p.icp)
+            target = Target.of(surface.at(np.isin(surface.polyline, partners_of)), p.local_map.icp)
             moving = seen.surface.at(seen.surface.polyline >= 0)
-            fit = align(moving, target, found.transform, p.icp, None, found.corresponding)
+            fit = align(moving, target, found.transform, p.local_map.icp, None, found.corresponding)
             starts.append(fit.pose)
         return np.array(starts).reshape(-1, 3)
 
@@ -242,66 +198,22 @@ class Tracker:
         surface = seen.surface
         stride = 1 + (len(surface) - 1) // p.max_points
         prior = np.diag([p.motion_sigma**-2, p.motion_sigma**-2, p.turn_sigma**-2])
-        assert self._target is not None
-        fit: Fit = align(surface.at(slice(None, None, stride)), self._target, start, p.icp, prior)
-        return Tracked(fit.pose, self._evidence(seen.scan, surface, fit.pose), fit.information)
+        thinned = surface.at(slice(None, None, stride))
+        fit = align(thinned, self._local.target, start, p.local_map.icp, prior)
+        evidence = self._local.evidence(seen.scan, surface, fit.pose)
+        return Tracked(fit.pose, evidence, fit.information)
 
     def _value(self, tracked: Tracked, predicted: FloatArray) -> float:
-        """Evidence less surprise: corridors leave a direction open, and speed is bounded."""
+        """Evidence less surprise: corridors leave a direction open, and speed is bounded.
+
+        Of several predictions (k, 3) the one that comes nearest counts.
+        """
         p = self.parameters
-        x, y, turn = se2.between(predicted, tracked.pose)
-        deviation = (x * x + y * y) / p.motion_sigma**2 + (turn / p.turn_sigma) ** 2
+        x, y, turn = se2.between(predicted, tracked.pose).T
+        deviation = ((x * x + y * y) / p.motion_sigma**2 + (turn / p.turn_sigma) ** 2).min()
         # Heavy-tailed: robots do turn on the spot between two scans, only not often.
         surprise = p.surprise * np.log1p(deviation)
         return float(tracked.evidence.score + p.novelty * tracked.evidence.novel - surprise)
-
-    def _evidence(self, scan: Scan, surface: Surface, pose: FloatArray) -> Evidence:
-        p = self.parameters
-        assert self._target is not None
-        placed = surface.moved(pose)
-        distance, _ = partners(placed, self._target, p.icp, p.overlap)
-        explained = np.isfinite(distance)
-        contradicted = ~explained
-        open_points = placed.points[~explained]
-        contradicted[~explained] = self._free_before(open_points, pose)
-        known = se2.transform_points(se2.inverse(pose), self._target.surface.points[::3])
-        in_sight = np.hypot(*known.T) < p.sight
-        through = seen_through(scan, known[in_sight], p.clearance, p.sight)
-        return Evidence(
-            float(explained.mean()),
-            float(contradicted.mean()),
-            float(through.mean()) if len(through) else 0.0,
-        )
-
-    def _free_before(self, points: FloatArray, pose: FloatArray) -> BoolArray:
-        """(n,) which `points`, tracking frame, the keyframes around `pose` saw through."""
-        p = self.parameters
-        near = sorted(self._keyframes, key=lambda k: float(np.hypot(*(k.pose - pose)[:2])))
-        free = np.zeros(len(points), dtype=np.bool_)
-        for keyframe in near[: p.witnesses]:
-            local = se2.transform_points(se2.inverse(keyframe.pose), points)
-            free |= seen_through(keyframe.scan, local, p.clearance, p.sight)
-        return free
-
-    def _is_news(self, pose: FloatArray) -> bool:
-        if not self._keyframes:
-            return True
-        x, y, turn = se2.between(self._keyframes[-1].pose, pose)
-        p = self.parameters
-        return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
-
-    def _remember(self, keyframe: Keyframe) -> None:
-        self._keyframes.append(keyframe)
-        surface = join_surfaces([k.surface for k in self._keyframes])
-        self._target = Target.of(surface, self.parameters.icp)
-        self._raster = None
-
-    def _nearness(self, centre: FloatArray) -> NearnessRaster:
-        p = self.parameters.search
-        if self._raster is None or np.abs(self._raster.centre - centre[:2]).max() > p.reach:
-            assert self._target is not None
-            self._raster = NearnessRaster.of(self._target.surface.points, centre[:2], p)
-        return self._raster
 
 
 def _first() -> Tracked:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mapweave.assembly import assemble
 from mapweave.cli import Command
+from mapweave.confidence import percent
 from mapweave.errors import FileError
 from mapweave.files import read_map, write_joint
 from mapweave.fusion import align_robots
@@ -18,7 +19,8 @@ EXIT_NOT_ALL_JOINED = 3
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("maps", metavar="MAP.json", type=Path, nargs="+", help="two or more maps")
+    parser.add_argument("first", metavar="MAP.json", type=Path, help="a robot's map")
+    parser.add_argument("others", metavar="MAP.json", type=Path, nargs="+", help="other robots'")
     parser.add_argument("--output", metavar="JOINT.json", type=Path, help="the joint map to write")
     parser.add_argument("--plot", metavar="JOINT.png", type=Path, help="the picture (png, svg)")
 
@@ -26,7 +28,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     if options.plot:
         check_picture_suffix(options.plot)
-    maps = _read_distinct(options.maps)
+    maps = _read_distinct([options.first, *options.others])
     joint = fuse(list(maps.values()))
     if options.output:
         write_joint(options.output, joint)
@@ -69,14 +71,14 @@ def tell(joint: JointMap) -> list[str]:
 def _tell_alignment(alignment: Alignment) -> str:
     return (
         f"{alignment.reference} - {alignment.other}: {alignment.decision}"
-        f" ({alignment.confidence:.0%}): {alignment.reason}"
+        f" ({percent(alignment.confidence)}): {alignment.reason}"
     )
 
 
 def _tell_components(joint: JointMap) -> list[str]:
     return [
         f"component of {', '.join(component.robots)}: {len(component.map.segments)} segments,"
-        f" confidence {component.confidence:.0%}"
+        f" confidence {percent(component.confidence)}"
         for component in joint.components
     ]
 

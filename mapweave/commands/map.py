@@ -2,13 +2,12 @@
 
 import argparse
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from mapweave.cli import Command, argument
-from mapweave.errors import FileError, MapweaveError
+from mapweave.errors import FileError
 from mapweave.files import write_map
 from mapweave.mapper import Mapper
 from mapweave.maps import RobotMap
@@ -16,7 +15,6 @@ from mapweave.names import check_id
 from mapweave.picture import check_picture_suffix, draw_map
 from mapweave.progress import track
 from mapweave.readers import count_scans, read_scans
-from mapweave.scan import Scan
 from mapweave.scan_range import ScanRange
 
 
@@ -32,7 +30,10 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="only scans A to B - 1",
     )
     parser.add_argument(
-        "--odometry", choices=["none", "prior"], default="none", help="use the log's odometry"
+        "--odometry",
+        choices=["none", "prior"],
+        default="none",
+        help="let the log's odometry help; what was seen decides (%(default)s)",
     )
     parser.add_argument(
         "--plot", metavar="MAP.png", type=Path, help="the picture to write (png, svg)"
@@ -41,11 +42,11 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     check_id("robot", options.robot)
-    if options.odometry == "prior":
-        raise MapweaveError("--odometry prior is not there yet; maps are made from scans alone")
     if options.plot:
         check_picture_suffix(options.plot)
-    robot_map, taken = _map_log(options.log, options.robot, options.scans)
+    robot_map, taken = _map_log(
+        options.log, options.robot, options.scans, odometry=options.odometry == "prior"
+    )
     if options.output:
         write_map(options.output, robot_map)
     if options.plot:
@@ -54,12 +55,13 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _map_log(log: Path, robot: str, chosen: ScanRange) -> tuple[RobotMap, int]:
+def _map_log(log: Path, robot: str, chosen: ScanRange, *, odometry: bool) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
     mapper = Mapper(robot)
     total = chosen.count(count_scans(log)) if sys.stderr.isatty() else None
     taken = 0
-    for scan in track(_chosen_scans(log, chosen), f"mapping {log.name}", total):
+    scans = chosen.of(read_scans(log, odometry=odometry, on_warning=_warn))
+    for scan in track(scans, f"mapping {log.name}", total):
         mapper.add(scan)
         taken += 1
     robot_map = mapper.finish()
@@ -70,10 +72,6 @@ def _map_log(log: Path, robot: str, chosen: ScanRange) -> tuple[RobotMap, int]:
             " returns, and a range of scans that it has",
         )
     return robot_map, taken
-
-
-def _chosen_scans(log: Path, chosen: ScanRange) -> Iterator[Scan]:
-    return chosen.of(read_scans(log, on_warning=_warn))
 
 
 def _warn(message: str) -> None:

@@ -1,0 +1,155 @@
+"""What a robot saw lately: what the next scan is aligned to and judged by.
+
+Returns that lie on known surfaces speak for a pose; returns inside what earlier scans saw through,
+and known surfaces that the new scan sees through, speak against it.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave import se2
+from mapweave.arrays import BoolArray, FloatArray
+from mapweave.icp import IcpParameters, Target, partners
+from mapweave.scan import Scan
+from mapweave.search import NearnessRaster, SearchParameters, search
+from mapweave.surface import Surface, join_surfaces
+from mapweave.visibility import seen_through
+
+
+class LocalMapParameters(BaseModel):
+    """What is remembered, and when it speaks for or against a pose."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    icp: IcpParameters = IcpParameters()
+    search: SearchParameters = SearchParameters()
+    keyframes: int = Field(60, ge=1, description="how many are remembered: some 15-20 m of path")
+    keyframe_step: float = Field(0.3, gt=0, description="[m] of motion that makes a new one")
+    keyframe_turn: float = Field(0.26, gt=0, description="[rad] of rotation that makes one: 15°")
+    witnesses: int = Field(12, ge=1, description="nearest keyframes asked what they saw through")
+    overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
+    clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
+    sight: float = Field(12.0, gt=0, description="[m] up to which seeing through counts")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What speaks for and against the pose of a scan, as shares in [0, 1].
+
+    Attributes
+    ----------
+    explained
+        Of the returns: on known surfaces.
+    contradicted
+        Of the returns: where earlier scans saw free space.
+    seen_through
+        Of the known surface points in sight: where this scan saw free space.
+    """
+
+    explained: float
+    contradicted: float
+    seen_through: float
+
+    @property
+    def novel(self) -> float:
+        """Of the returns: where nobody looked before; they speak neither for nor against."""
+        return 1.0 - self.explained - self.contradicted
+
+    @property
+    def score(self) -> float:
+        """For minus against."""
+        return self.explained - self.contradicted - self.seen_through
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keyframe:
+    """A remembered scan at its pose (3,), with its surface in the tracking frame."""
+
+    scan: Scan
+    pose: FloatArray
+    surface: Surface
+
+
+class LocalMap:
+    """The last keyframes; empty until the first is remembered."""
+
+    def __init__(self, parameters: LocalMapParameters) -> None:
+        self._parameters = parameters
+        self._keyframes: deque[Keyframe] = deque(maxlen=parameters.keyframes)
+        self._target: Target | None = None
+        self._raster: NearnessRaster | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was remembered yet."""
+        return not self._keyframes
+
+    @property
+    def target(self) -> Target:
+        """What scans are aligned to; there is none while the map is empty."""
+        if self._target is None:
+            surface = join_surfaces([k.surface for k in self._keyframes])
+            self._target = Target.of(surface, self._parameters.icp)
+        return self._target
+
+    def remember(self, scan: Scan, surface: Surface, pose: FloatArray) -> None:
+        """Add a scan taken at `pose` (3,), unless it was taken about where the last one was.
+
+        Parameters
+        ----------
+        surface
+            Its oriented points, sensor frame.
+        """
+        if self._is_news(pose):
+            self._keyframes.append(Keyframe(scan, pose, surface.moved(pose)))
+            self._target = self._raster = None
+
+    def search(self, points: FloatArray, centre: FloatArray, max_turn: float) -> FloatArray:
+        """Return the (k, 3) best poses for (n, 2) `points` in a window about `centre` (3,)."""
+        raster = self._nearness(centre)
+        return search(points, raster, centre, max_turn, self._parameters.search)
+
+    def _nearness(self, centre: FloatArray) -> NearnessRaster:
+        """Return a raster about `centre`, made anew only where it has moved away."""
+        p = self._parameters.search
+        if self._raster is None or np.abs(self._raster.centre - centre[:2]).max() > p.reach:
+            self._raster = NearnessRaster.of(self.target.surface.points, centre[:2], p)
+        return self._raster
+
+    def evidence(self, scan: Scan, surface: Surface, pose: FloatArray) -> Evidence:
+        """Return what speaks for and against `scan`, with oriented points `surface`, at `pose`."""
+        p = self._parameters
+        placed = surface.moved(pose)
+        distance, _ = partners(placed, self.target, p.icp, p.overlap)
+        explained = np.isfinite(distance)
+        contradicted = ~explained
+        open_points = placed.points[~explained]
+        contradicted[~explained] = self._free_before(open_points, pose)
+        known = se2.transform_points(se2.inverse(pose), self.target.surface.points[::3])
+        in_sight = np.hypot(*known.T) < p.sight
+        through = seen_through(scan, known[in_sight], p.clearance, p.sight)
+        return Evidence(
+            float(explained.mean()),
+            float(contradicted.mean()),
+            float(through.mean()) if len(through) else 0.0,
+        )
+
+    def _free_before(self, points: FloatArray, pose: FloatArray) -> BoolArray:
+        """(n,) which `points`, tracking frame, the keyframes around `pose` saw through."""
+        p = self._parameters
+        near = sorted(self._keyframes, key=lambda k: float(np.hypot(*(k.pose - pose)[:2])))
+        free = np.zeros(len(points), dtype=np.bool_)
+        for keyframe in near[: p.witnesses]:
+            local = se2.transform_points(se2.inverse(keyframe.pose), points)
+            free |= seen_through(keyframe.scan, local, p.clearance, p.sight)
+        return free
+
+    def _is_news(self, pose: FloatArray) -> bool:
+        if not self._keyframes:
+            return True
+        x, y, turn = se2.between(self._keyframes[-1].pose, pose)
+        p = self._parameters
+        return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
