@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mapweave.confidence import percent
 from mapweave.maps import Alignment, JointComponent, RobotMap
 from mapweave_deploy.launcher import Outcome
 from mapweave_deploy.occupancy import grid_bytes
@@ -51,7 +52,8 @@ def _tell_alignments(alignments: Sequence[Alignment]) -> Iterator[str]:
     yield "Who joined whom:"
     joined = [a for a in alignments if a.decision == "accepted"]
     for alignment in joined:
-        yield f"  {_names(alignment)}, confidence {alignment.confidence:.2f}: {alignment.reason}"
+        sure = percent(alignment.confidence)
+        yield f"  {_names(alignment)}, confidence {sure}: {alignment.reason}"
     if not joined:
         yield "  nobody"
     others = [a for a in alignments if a.decision != "accepted"]
@@ -70,7 +72,7 @@ def _tell_component(component: JointComponent) -> str:
     segments = f"{len(component.map.segments)} segments"
     if len(component.robots) == 1:
         return f"{names} alone, {segments}"
-    return f"{names}, confidence {component.confidence:.2f}, {segments}"
+    return f"{names}, confidence {percent(component.confidence)}, {segments}"
 
 
 def tell_verdicts(outcome: Outcome, members: Sequence[Member], *, simulated: bool) -> Iterator[str]:

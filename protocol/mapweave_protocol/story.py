@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mapweave.maps import JointMap, RobotMap
+from mapweave.confidence import percent
+from mapweave.maps import JointComponent, JointMap, RobotMap
 from mapweave_protocol.messages import AlignmentMessage, StatusMessage
 
 
@@ -82,16 +83,13 @@ class Story:
                 self._decisions[pair] = alignment.decision
                 yield (
                     f"{pair[0]} and {pair[1]}: {alignment.decision},"
-                    f" confidence {alignment.confidence:.2f} ({alignment.reason})"
+                    f" confidence {percent(alignment.confidence)} ({alignment.reason})"
                 )
 
     def joined(self, joint: JointMap) -> Iterator[str]:
         """Tell a version of the joint map."""
         self.joint = joint
-        groups = [
-            f"{' + '.join(sorted(component.robots))} ({component.confidence:.2f})"
-            for component in joint.components
-        ]
+        groups = [_tell_component(component) for component in joint.components]
         yield f"joint map {joint.version}: {', '.join(groups) or 'nothing yet'}"
 
     def _robot(self, robot: str) -> RobotState:
@@ -100,3 +98,8 @@ class Story:
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _tell_component(component: JointComponent) -> str:
+    names = " + ".join(sorted(component.robots))
+    return names if len(component.robots) == 1 else f"{names} ({percent(component.confidence)})"

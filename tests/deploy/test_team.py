@@ -54,7 +54,7 @@ def test_the_robots_end_in_one_component_rightly(arena: Run) -> None:
 
 
 def test_words_say_who_joined_whom_with_which_confidence(arena: Run) -> None:
-    assert re.search(r"r1/0 and r2/0, confidence [01]\.\d\d: \d+ m of wall in common", arena.said)
+    assert re.search(r"r1/0 and r2/0, confidence (over )?\d+%: \d+ m of wall in common", arena.said)
 
 
 def test_words_name_the_files_which_are_there(arena: Run) -> None:

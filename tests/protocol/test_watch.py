@@ -74,8 +74,8 @@ def test_a_decision_is_told_when_it_is_new_with_confidence_and_reason() -> None:
     decisions: list[Decision] = ["ambiguous", "ambiguous", "accepted"]
     lines = [line for decision in decisions for line in story.aligned(decided(decision))]
     assert lines == [
-        "a/0 and b/0: ambiguous, confidence 0.50 (look-alike corridors)",
-        "a/0 and b/0: accepted, confidence 0.50 (look-alike corridors)",
+        "a/0 and b/0: ambiguous, confidence 50% (look-alike corridors)",
+        "a/0 and b/0: accepted, confidence 50% (look-alike corridors)",
     ]
 
 
