@@ -1,11 +1,12 @@
 """Scan to line segments, directed so that the visible side is known (paper, V).
 
 Split and merge: consecutive returns are cut into runs where the range jumps, each run is split
-at its farthest point until it is straight, and every straight piece is fitted by total least
-squares. Beams run counter-clockwise, so a segment in beam order has the sensor, and with it the
-visible side, on its left.
+at its farthest point until it is straight, neighbouring pieces that one line explains are merged
+again, and every piece is fitted by total least squares. Beams run counter-clockwise, so a segment
+in beam order has the sensor, and with it the visible side, on its left.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -69,7 +70,8 @@ def extract_segments(scan: Scan, parameters: SegmentParameters | None = None) ->
     tolerance = p.tolerance + p.relative_tolerance * scan.ranges[used]
     segments: list[FloatArray] = []
     for first, last in _runs(_breaks(scan, used, points, p), len(used)):
-        for a, b in _straight_pieces(points, tolerance, first, last):
+        pieces = _straight_pieces(points, tolerance, first, last)
+        for a, b in _merged_pieces(points, tolerance, pieces):
             if b - a < p.min_points:
                 continue
             segment = fit_segment(points[a:b])
@@ -81,15 +83,19 @@ def extract_segments(scan: Scan, parameters: SegmentParameters | None = None) ->
 
 def fit_segment(points: FloatArray) -> FloatArray:
     """Return the (4,) total-least-squares segment of (k, 2) `points`, along their order."""
-    centre = points.mean(axis=0)
-    offsets = points - centre
-    (xx, xy), (_, yy) = offsets.T @ offsets
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)  # the major axis of the scatter matrix
-    direction = np.array([np.cos(angle), np.sin(angle)])
-    if direction @ (points[-1] - points[0]) < 0:
-        direction = -direction
-    along = offsets @ direction
+    centre, direction = _fit_line(points)
+    along = (points - centre) @ direction
     return np.concatenate([centre + along.min() * direction, centre + along.max() * direction])
+
+
+def _fit_line(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Centre (2,) and unit direction (2,) of the line of least squares across `points`."""
+    centre: FloatArray = points.sum(axis=0) / len(points)
+    offsets = points - centre
+    (xx, xy), (_, yy) = (offsets.T @ offsets).tolist()
+    angle = 0.5 * math.atan2(2 * xy, xx - yy)  # the major axis of the scatter matrix
+    direction = np.array([math.cos(angle), math.sin(angle)])
+    return centre, -direction if direction @ (points[-1] - points[0]) < 0 else direction
 
 
 def _breaks(scan: Scan, used: IntArray, points: FloatArray, p: SegmentParameters) -> BoolArray:
@@ -135,3 +141,26 @@ def _straight_pieces(
             stack.append((a + worst, b))
             stack.append((a, a + worst + 1))
     return sorted(pieces)
+
+
+def _merged_pieces(
+    points: FloatArray, tolerance: FloatArray, pieces: list[tuple[int, int]]
+) -> list[tuple[int, int]]:
+    """Merge neighbouring pieces that are straight together.
+
+    A chord runs between two single returns, and with those two in error a straight wall is split.
+    """
+    merged = pieces[:1]
+    for a, b in pieces[1:]:
+        first = merged[-1][0]
+        if _is_straight(points[first:b], tolerance[first:b]):
+            merged[-1] = (first, b)
+        else:
+            merged.append((a, b))
+    return merged
+
+
+def _is_straight(points: FloatArray, tolerance: FloatArray) -> bool:
+    """Whether all (k, 2) `points` lie within (k,) `tolerance` [m] of the line that fits best."""
+    centre, (x, y) = _fit_line(points)
+    return bool((np.abs((points - centre) @ np.array([-y, x])) <= tolerance).all())

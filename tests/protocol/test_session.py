@@ -184,12 +184,12 @@ def test_hostile_payloads_are_counted_and_warned_of_once_and_the_rest_still_arri
     ):
         for payload in (b"", b"\xc1", bytes(1000), as_another, good[:-1], good):
             publisher.put(payload)
-        read = None
-        while read is None:
+        accepted = []
+        for _ in range(6):  # what was put before the link stood may come after what was put later
             arrival = inbox.get(PATIENCE)
             assert arrival is not None
-            read = reader.read(arrival)
-    assert read.robot == "a"
+            accepted += [message.robot for message in [reader.read(arrival)] if message is not None]
+    assert accepted == ["a"]
     assert reader.refused == 5
     assert len([record for record in caplog.records if "ignored" in record.message]) == 1
 
