@@ -71,9 +71,8 @@ def extract_segments(scan: Scan, parameters: SegmentParameters | None = None) ->
     segments: list[FloatArray] = []
     for first, last in _runs(_breaks(scan, used, points, p), len(used)):
         pieces = _straight_pieces(points, tolerance, first, last)
+        pieces = [(a, b) for a, b in pieces if b - a >= p.min_points]
         for a, b in _merged_pieces(points, tolerance, pieces):
-            if b - a < p.min_points:
-                continue
             segment = fit_segment(points[a:b])
             if np.hypot(*(segment[2:] - segment[:2])) >= p.min_length:
                 label[used[a:b]] = len(segments)
@@ -146,14 +145,15 @@ def _straight_pieces(
 def _merged_pieces(
     points: FloatArray, tolerance: FloatArray, pieces: list[tuple[int, int]]
 ) -> list[tuple[int, int]]:
-    """Merge neighbouring pieces that are straight together.
+    """Merge pieces that share a corner and are straight together.
 
-    A chord runs between two single returns, and with those two in error a straight wall is split.
+    A chord runs between two single returns; with those in error a straight wall was split.
     """
     merged = pieces[:1]
     for a, b in pieces[1:]:
         first = merged[-1][0]
-        if _is_straight(points[first:b], tolerance[first:b]):
+        touches = a < merged[-1][1]
+        if touches and _is_straight(points[first:b], tolerance[first:b]):
             merged[-1] = (first, b)
         else:
             merged.append((a, b))

@@ -107,3 +107,25 @@ def test_the_fit_is_the_line_of_least_squares_across(rng: Generator) -> None:
 
     fitted = spread(float(np.arctan2(*(end - start)[::-1])))
     assert fitted <= min(spread(a) for a in np.linspace(0, np.pi, 2000)) + 1e-9
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_wall_is_one_segment_however_its_returns_err(seed: int) -> None:
+    """Noise of 1 cm, 4 cm at its ends: the chord between those would split it."""
+    rng = np.random.default_rng(seed)
+    wall = np.array([[3.0, -2.5, 3.0, 2.5]])
+    scan = cast(wall, [0, 0, 0], noise=rng)
+    hits = np.flatnonzero(scan.hits)
+    scan.ranges[hits[[0, -1]]] += rng.choice([-0.04, 0.04], 2)
+    (found,) = extract_segments(scan).segments
+    run = found[2:] - found[:2]
+    assert np.hypot(*run) == pytest.approx(5, abs=0.25)
+    assert abs(np.degrees(np.arctan2(run[0], run[1]))) < 0.5
+
+
+def test_walls_that_meet_at_a_slight_angle_stay_two() -> None:
+    """Ten degrees, 2 m each: 9 cm off one line in the middle, more than returns err."""
+    bend = np.array([[3.0, -2.0, 3.0, 0.0], [3.0, 0.0, 3.0 - np.tan(np.radians(10)) * 2, 2.0]])
+    found = extract_segments(cast(bend, [0, 0, 0])).segments
+    turn = np.degrees(np.arctan2(found[:, 2] - found[:, 0], found[:, 3] - found[:, 1]))
+    np.testing.assert_allclose(turn, [0, -10], atol=1)
