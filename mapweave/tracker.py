@@ -123,13 +123,15 @@ class Tracker:
     def _locate(self, seen: Observation, known: Callable[[], LineMap]) -> Tracked | None:
         """Try what is likely first, then what shapes propose, then everything within reach."""
         p = self.parameters
+        # After a scan that fitted nowhere the robot may be anywhere: only what convinces counts.
+        enough_at_last = p.acceptable if self._followed else p.convincing
         predicted = self._predictions(seen.scan)
         points = seen.surface.points
         stages: list[tuple[float, Callable[[], FloatArray]]] = [
             (p.convincing, lambda: np.vstack([predicted, self.pose])),
             (p.convincing, lambda: self._shape_starts(seen, known())),
             (p.convincing, lambda: self._local.search(points, predicted[0], p.first_window)),
-            (p.acceptable, lambda: self._local.search(points, predicted[0], np.pi)),
+            (enough_at_last, lambda: self._local.search(points, predicted[0], np.pi)),
         ]
         found: list[Tracked] = []
         for enough, starts in stages:
@@ -137,7 +139,6 @@ class Tracker:
             best = max(found, key=lambda t: self._value(t, predicted), default=None)
             if best is not None and best.evidence.score >= enough:
                 return self._slid(seen, best, predicted)
-        # After a scan that fitted nowhere the robot may be anywhere: a weak pose is worth nothing.
         taken = best is not None and self._followed and self._stands_out(best, found)
         return best if taken else None
 
