@@ -67,7 +67,7 @@ def test_doorways_hold_a_robot_at_any_speed(step: float, rng: Generator) -> None
 
 def test_an_end_wall_in_sight_holds_a_robot(rng: Generator) -> None:
     """Two bare walls and an end that is up to 24 m away."""
-    assert_followed(drive(ENDS, np.arange(10, 31, 0.7), rng), 0.15)
+    assert_followed(drive(ENDS, np.arange(10, 31, 0.5), rng), 0.15)
 
 
 def test_an_end_wall_holds_a_robot_that_changes_its_speed(rng: Generator) -> None:
