@@ -55,7 +55,8 @@ def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> Ba
     if union.is_empty:
         return union
     width = parameters.min_width / 2
-    opened = union.buffer(-width, join_style="mitre").buffer(width, join_style="mitre")
+    with np.errstate(invalid="ignore", divide="ignore"):  # GEOS mitres corners of no width at all
+        opened = union.buffer(-width, join_style="mitre").buffer(width, join_style="mitre")
     union = shapely.simplify(opened, parameters.simplification)
     return MultiPolygon([p for p in _polygons(union) if p.area >= parameters.min_area])
 

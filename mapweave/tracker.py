@@ -37,8 +37,9 @@ class TrackerParameters(BaseModel):
     motion_sigma: float = Field(0.5, gt=0, description="[m] of a step against constant velocity")
     turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
     surprise: float = Field(
-        0.03, ge=0, description="share of returns that a motion e sigma² off is worth less"
+        0.02, ge=0, description="share of returns that a step e sigma² off is worth less"
     )
+    turn_surprise: float = Field(0.03, ge=0, description="the same for the turn")
     novelty: float = Field(
         0.5,
         ge=0,
@@ -211,9 +212,10 @@ class Tracker:
         """
         p = self.parameters
         x, y, turn = se2.between(predicted, tracked.pose).T
-        deviation = ((x * x + y * y) / p.motion_sigma**2 + (turn / p.turn_sigma) ** 2).min()
         # Heavy-tailed: robots do turn on the spot between two scans, only not often.
-        surprise = p.surprise * np.log1p(deviation)
+        moved = p.surprise * np.log1p((x * x + y * y) / p.motion_sigma**2)
+        turned = p.turn_surprise * np.log1p((turn / p.turn_sigma) ** 2)
+        surprise = (moved + turned).min()
         return float(tracked.evidence.score + p.novelty * tracked.evidence.novel - surprise)
 
 
