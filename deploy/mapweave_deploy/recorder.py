@@ -4,8 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
+from mapweave.errors import InvalidIdError
+from mapweave_protocol.errors import ForeignKeyError
 from mapweave_protocol.inbox import Arrival
-from mapweave_protocol.keys import ALIGNMENT, MAP, STATUS
+from mapweave_protocol.keys import ALIGNMENT, MAP, STATUS, KeyFormat
 from mapweave_protocol.messages import StatusMessage
 from mapweave_protocol.watch import Watcher
 
@@ -41,8 +43,8 @@ class Recorder:
     def take(self, arrival: Arrival) -> Iterator[str]:
         """Take in a message; yield the lines that tell what is new about it."""
         for kind, keys in KINDS.items():
-            if keys.matches(arrival.key):
-                sender = keys.parse(arrival.key)["robot"]
+            sender = _sender(keys, arrival.key)
+            if sender is not None:
                 self.traffic.setdefault((sender, kind), Count()).add(arrival.payload)
         yield from self._watcher.tell(arrival)
 
@@ -55,6 +57,14 @@ class Recorder:
     def sent(self, robot: str) -> dict[str, Count]:
         """Return by kind of message what `robot` published."""
         return {kind: self.traffic.get((robot, kind), Count()) for kind in KINDS}
+
+
+def _sender(keys: KeyFormat, key: str) -> str | None:
+    """Return the robot that publishes at `key`, None if that is no key of a robot's."""
+    try:
+        return keys.parse(key)["robot"]
+    except (ForeignKeyError, InvalidIdError):
+        return None
 
 
 def is_done(robots: list[str], statuses: Mapping[str, StatusMessage]) -> bool:

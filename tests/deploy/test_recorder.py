@@ -78,3 +78,10 @@ def test_messages_and_bytes_are_counted_by_robot_and_kind() -> None:
     assert recorder.sent("r1")["map"].size == 0
     assert recorder.statuses["r1"].scans_placed == 9
     assert lines == ["r1 has finished: 9 scans, 9 placed"]
+
+
+@pytest.mark.parametrize("end", ["R1/map", "R1/status", "r1/alignment/R1/r2"])
+def test_a_key_with_an_invalid_id_is_of_no_robot(end: str) -> None:
+    recorder = Recorder()
+    assert list(recorder.take(Arrival(f"mapweave/@v1/t/agent/{end}", b"junk"))) == []
+    assert not recorder.traffic
