@@ -14,7 +14,6 @@ from mapweave_protocol import packing
 from mapweave_protocol.model import WireModel
 
 SUBMAP_REACH = 1e3  # [m] from a submap's origin; submaps are some 20 m across
-WORLD_REACH = 1e5  # [m] from a component's origin
 MAX_SUBMAPS = 4096  # of one robot: some 60 km of path
 MAX_SEGMENTS = 200_000  # of one line map
 MAX_VERTICES = 400_000  # of the free space of one line map

@@ -8,14 +8,15 @@ from pydantic import Field, model_validator
 from mapweave.maps import JointComponent, JointMap
 from mapweave_protocol import packing
 from mapweave_protocol.alignment_message import WireAlignment
-from mapweave_protocol.geometry import MAX_BYTES, MAX_SEGMENTS, WORLD_REACH, PackedLines
+from mapweave_protocol.geometry import MAX_BYTES, MAX_SEGMENTS, PackedLines
 from mapweave_protocol.model import (
+    JOINT_REACH,
     MAX_ALIGNMENTS,
     ComponentName,
     Id,
+    JointTransform,
     Message,
     Probability,
-    Transform,
     WireModel,
     to_transform,
 )
@@ -24,7 +25,7 @@ from mapweave_protocol.model import (
 class WireComponent(WireModel):
     """A component of the joint map."""
 
-    robots: dict[ComponentName, Transform] = Field(min_length=1, max_length=MAX_ALIGNMENTS)
+    robots: dict[ComponentName, JointTransform] = Field(min_length=1, max_length=MAX_ALIGNMENTS)
     confidence: Probability
     lines: PackedLines
     segment_confidence: bytes = Field(max_length=MAX_BYTES)
@@ -32,9 +33,9 @@ class WireComponent(WireModel):
     @classmethod
     def pack(cls, component: JointComponent) -> Self:
         """Return `component` for the wire; confidences of segments in per mille."""
-        lines = PackedLines.pack(component.map, WORLD_REACH)
+        lines = PackedLines.pack(component.map, JOINT_REACH)
         # Segments too short for the wire vanish from both alike: count what is left.
-        kept = PackedLines.kept(component.map, WORLD_REACH)
+        kept = PackedLines.kept(component.map, JOINT_REACH)
         confidence = packing.quantise(component.segment_confidence[kept], 1e3, 1.0)
         return cls(
             robots={name: to_transform(pose) for name, pose in component.robots.items()},
@@ -56,7 +57,7 @@ class WireComponent(WireModel):
         ValueError
             If its arrays do not fit each other.
         """
-        lines = self.lines.unpack(WORLD_REACH)
+        lines = self.lines.unpack(JOINT_REACH)
         permille = packing.unpack_integers(self.segment_confidence, 1, MAX_SEGMENTS)[:, 0]
         if len(permille) != len(lines.segments) or np.any(permille < 0):
             raise ValueError("segment confidences, expected one of 0 to 1 for each segment")

@@ -13,10 +13,17 @@ from mapweave_protocol.geometry import (
     DIGEST_SIZE,
     MAX_BYTES,
     MAX_SUBMAPS,
-    WORLD_REACH,
     PackedSubmap,
 )
-from mapweave_protocol.model import Count, Id, Message, Transform, WireModel, to_transform
+from mapweave_protocol.model import (
+    WORLD_REACH,
+    Count,
+    Id,
+    Message,
+    Transform,
+    WireModel,
+    to_transform,
+)
 
 MAX_COMPONENT = 99_999
 

@@ -1,5 +1,6 @@
 """What all messages have in common, and the kinds of names and numbers in them."""
 
+import math
 from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -7,6 +8,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from mapweave.arrays import FloatArray
 from mapweave.names import ID_PATTERN
 
+WORLD_REACH = 1e5  # [m] from a component's origin
+JOINT_REACH = 1e9  # [m]; alignments within WORLD_REACH add up along a chain of components
 MAX_COUNT = 2**53
 MAX_ALIGNMENTS = 4096
 
@@ -26,7 +29,12 @@ def _check_printable(text: str) -> str:
 Label = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_check_printable)]
 Sentence = Annotated[str, Field(max_length=500), AfterValidator(_check_printable)]
 ComponentName = Annotated[str, Field(pattern=ID_PATTERN[:-1] + "/(0|[1-9][0-9]{0,4})$")]
-Transform = tuple[Number, Number, Number]
+# A whole turn, as nobody promises that a sum of two angles was wrapped.
+Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False)]
+Metres = Annotated[float, Field(ge=-WORLD_REACH, le=WORLD_REACH, allow_inf_nan=False)]
+JointMetres = Annotated[float, Field(ge=-JOINT_REACH, le=JOINT_REACH, allow_inf_nan=False)]
+Transform = tuple[Metres, Metres, Angle]
+JointTransform = tuple[JointMetres, JointMetres, Angle]
 
 
 class WireModel(BaseModel):

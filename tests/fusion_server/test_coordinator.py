@@ -11,6 +11,9 @@ import pytest
 
 from mapweave.maps import RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters, Draft
+from mapweave_protocol.codec import encode
+from mapweave_protocol.messages import JointMapMessage
+from mapweave_protocol.model import WORLD_REACH
 
 if TYPE_CHECKING:
     from tests.fusion_server.conftest import MakeAlignments, MakeMap
@@ -28,6 +31,17 @@ def _make_version(coordinator: Coordinator, now: float = 0.0) -> Draft:
 
 def _decisions(draft: Draft) -> list[str]:
     return [alignment.decision for alignment in draft.alignments]
+
+
+def test_the_furthest_alignment_that_may_arrive_makes_a_version_that_can_be_sent(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    maps = make_map("a"), make_map("b")
+    for robot_map in maps:
+        coordinator.receive_map(robot_map)
+    coordinator.receive_alignments(make_alignments(*maps, transform=(WORLD_REACH, 0.0, 0.0)))
+    encode(JointMapMessage.pack(_make_version(coordinator).build(), "s1"))
 
 
 def test_no_version_is_due_before_anything_was_received() -> None:

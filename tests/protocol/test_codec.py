@@ -295,6 +295,14 @@ def test_an_alignment_of_another_pair_is_refused() -> None:
         AlignmentMessage.pack("a", versions[0], versions[1], [ALIGNMENT])
 
 
+@pytest.mark.parametrize("transform", [(1e9, 0.0, 0.0), (0.0, -1.1e5, 0.0), (0.0, 0.0, 7.0)])
+def test_an_alignment_to_nowhere_is_refused(transform: tuple[float, float, float]) -> None:
+    fields = alignments().model_dump()
+    fields["alignments"][0]["transform"] = transform
+    with pytest.raises(MessageError, match="transform"):
+        decode(AlignmentMessage, envelope(alignments(), msgpack.packb(fields)))
+
+
 def test_a_reason_that_would_move_the_cursor_is_refused() -> None:
     fields = alignments().model_dump()
     fields["alignments"][0]["reason"] = "\x1b[2J"
