@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Set
 
 from mapweave.errors import FileError, InvalidIdError
+from mapweave.maps import RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, pair_of
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
@@ -42,6 +43,7 @@ class Intake:
         self._alignments = alignment_reader()
         self._assembler = MapAssembler()
         self._packers: defaultdict[str, MapSender] = defaultdict(MapSender)
+        self._too_large: set[str] = set()
         self._warned_of_too_many = False
 
     @property
@@ -84,11 +86,21 @@ class Intake:
 
     def _take_map(self, message: MapMessage, received: float) -> None:
         new = self._assembler.update(message)
-        if new is not None and self._coordinator.receive_map(new):
-            # Kept complete, whatever part of it has just come.
-            complete = self._packers[new.robot].payload(new, complete=True)
+        # Kept complete, whatever part of it has just come.
+        complete = self._pack(new) if new is not None else None
+        if new is not None and complete is not None and self._coordinator.receive_map(new):
             self._store.keep_map(new.robot, received, complete)
             record(self._story.mapped(new))
+
+    def _pack(self, robot_map: RobotMap) -> bytes | None:
+        """Return the complete message; None if the parts that came make too large a whole."""
+        try:
+            return self._packers[robot_map.robot].payload(robot_map, complete=True)
+        except MessageError as error:
+            if robot_map.robot not in self._too_large:
+                self._too_large.add(robot_map.robot)
+                _log.warning("map of %s ignored, %s", robot_map.robot, error)
+            return None
 
     def _take_alignments(self, new: AlignmentMessage, payload: bytes, received: float) -> None:
         if self._coordinator.receive_alignments(new):
