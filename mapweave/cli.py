@@ -94,6 +94,9 @@ def _report(command: Command, options: argparse.Namespace) -> int:
     except MapweaveError as error:
         print(f"mapweave: {error}", file=sys.stderr)  # noqa: T201
         return EXIT_FAILED
+    except MemoryError:
+        print("mapweave: not enough memory for this input", file=sys.stderr)  # noqa: T201
+        return EXIT_FAILED
     except KeyboardInterrupt:
         print("mapweave: interrupted", file=sys.stderr)  # noqa: T201
         return EXIT_INTERRUPTED

@@ -4,11 +4,19 @@ Fields that are not known here are ignored, so that a later version may add some
 is not known (a stamp, say) is NaN in memory and ``null`` in the file.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    model_validator,
+)
 
 from mapweave.maps import (
     Alignment,
@@ -28,11 +36,23 @@ MAP_FORMAT: _MapFormat = "mapweave/map/1"
 JOINT_FORMAT: _JointFormat = "mapweave/joint/1"
 
 _Count: TypeAlias = Annotated[int, Field(ge=0, le=2**53)]
-# The bound keeps sums and squares of coordinates finite; the Earth is smaller.
-_Metre: TypeAlias = Annotated[float, Field(ge=-1e8, le=1e8)]
+MAX_SEGMENT = 1000.0  # [m]; no lidar sees farther
+# The bound keeps sums and squares of coordinates finite; no robot drives farther.
+_Metre: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Probability: TypeAlias = Annotated[float, Field(ge=0, le=1)]
 _Pose: TypeAlias = tuple[_Metre, _Metre, float]
-_Segment: TypeAlias = tuple[_Metre, _Metre, _Metre, _Metre]
+
+
+def _seen_at_once(segment: tuple[float, float, float, float]) -> tuple[float, ...]:
+    x1, y1, x2, y2 = segment
+    if math.hypot(x2 - x1, y2 - y1) > MAX_SEGMENT:
+        raise ValueError(f"expected a segment of at most {MAX_SEGMENT:g} m")
+    return segment
+
+
+_Segment: TypeAlias = Annotated[
+    tuple[_Metre, _Metre, _Metre, _Metre], AfterValidator(_seen_at_once)
+]
 _Polyline: TypeAlias = Annotated[list[_Segment], Field(min_length=1)]
 _Polygon: TypeAlias = Annotated[list[tuple[_Metre, _Metre]], Field(min_length=3)]
 _TrajectoryRow: TypeAlias = tuple[_Count, float | None, _Metre, _Metre, float]

@@ -132,6 +132,33 @@ def replace_file(path: str | Path) -> Iterator[Path]:
         raise FileError(given, f"cannot be written ({error.strerror or error})") from error
 
 
+def check_outputs(outputs: Sequence[Path | None], inputs: Sequence[Path]) -> None:
+    """Find out before the work whether its results can be written.
+
+    Parameters
+    ----------
+    outputs
+        Files that will be written; None is passed over.
+    inputs
+        Files that were read, which must not be written over.
+
+    Raises
+    ------
+    FileError
+        If one cannot be written, or is another one's name as well.
+    """
+    taken = {path.resolve(): "is read, and would be overwritten" for path in inputs}
+    for path in outputs:
+        if path is None:
+            continue
+        _check_replaceable(path)
+        if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+            raise FileError(path, f"cannot be written: there is no writable folder {path.parent}")
+        if path.resolve() in taken:
+            raise FileError(path, f"{taken[path.resolve()]}; expected another name")
+        taken[path.resolve()] = "is named for two results"
+
+
 def _check_replaceable(path: Path) -> None:
     if path.exists() and not path.is_file():
         raise FileError(path, "is not a regular file; expected the name of a file to write")

@@ -90,8 +90,9 @@ class Mapper:
         if not placed:
             self._waiting.append(seen)
             if len(self._waiting) >= self.parameters.patience:
-                lost = self._start_again()
-                placed = True
+                self._start_again()
+                lost = True
+                placed = seen not in self._waiting
         return Placement(placed, self._component, len(self._finished) > finished, lost)
 
     def finish(self) -> RobotMap:
@@ -135,7 +136,7 @@ class Mapper:
                 pose = tracked.pose
         self._waiting.clear()
 
-    def _start_again(self) -> bool:
+    def _start_again(self) -> None:
         """Begin a new component with the scans that wait; they fit each other or wait on."""
         waiting, self._waiting = self._waiting, []
         if not self._growing.is_empty:
@@ -147,7 +148,6 @@ class Mapper:
         for seen in waiting:
             if not self._place(seen):
                 self._waiting.append(seen)
-        return True
 
     def _merge(self, seen: Observation, pose: FloatArray) -> None:
         """Merge a scan at `pose`, tracker's frame, into the growing submap."""

@@ -31,17 +31,23 @@ def seen_through(
         [m] beyond which a beam proves nothing.
     """
     clear = clear_ranges(scan, max_range)
-    bearing = np.arctan2(points[:, 1], points[:, 0])
-    beam = nearest_beam(scan, bearing)
-    inside = (bearing >= scan.angles[0]) & (bearing <= scan.angles[-1])
+    beam, inside = _beams(scan, np.arctan2(points[:, 1], points[:, 0]))
     before: BoolArray = np.hypot(points[:, 0], points[:, 1]) < clear[beam] - margin
     through: BoolArray = inside & before
     return through
 
 
-def nearest_beam(scan: Scan, bearing: FloatArray) -> IntArray:
-    """Return (n,) which beam points nearest to each `bearing` [rad]."""
-    spacing = (scan.angles[-1] - scan.angles[0]) / max(len(scan.angles) - 1, 1)
-    beam = np.rint((bearing - scan.angles[0]) / spacing).astype(np.int64)
-    nearest: IntArray = np.clip(beam, 0, len(scan.angles) - 1)
-    return nearest
+def _beams(scan: Scan, bearing: FloatArray) -> tuple[IntArray, BoolArray]:
+    """Return (n,) which beam points nearest to each `bearing` [rad], and whether one does.
+
+    Bearings are counted from the first beam on, so that it does not matter where a turn begins.
+    """
+    count = len(scan.angles)
+    spacing = (scan.angles[-1] - scan.angles[0]) / max(count - 1, 1)
+    turn = 2 * np.pi
+    steps = np.mod(bearing - scan.angles[0], turn) / spacing
+    closed = count * spacing > turn - spacing / 2  # the last beam and the first are neighbours
+    inside: BoolArray = (steps <= count - 1) | closed
+    beam: IntArray = np.rint(steps).astype(np.int64)
+    beam[beam >= count] = 0
+    return beam, inside

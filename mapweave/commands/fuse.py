@@ -8,7 +8,7 @@ from mapweave.assembly import assemble
 from mapweave.cli import Command
 from mapweave.confidence import percent
 from mapweave.errors import FileError
-from mapweave.files import read_map, write_joint
+from mapweave.files import check_outputs, read_map, write_joint
 from mapweave.fusion import align_robots
 from mapweave.joint import build_joint_map
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name
@@ -28,7 +28,9 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     if options.plot:
         check_picture_suffix(options.plot)
-    maps = _read_distinct([options.first, *options.others])
+    inputs = [options.first, *options.others]
+    check_outputs([options.output, options.plot], inputs)
+    maps = _read_distinct(inputs)
     joint = fuse(list(maps.values()))
     if options.output:
         write_joint(options.output, joint)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mapweave.cli import Command, argument
 from mapweave.errors import FileError
-from mapweave.files import write_map
+from mapweave.files import check_outputs, write_map
 from mapweave.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.names import check_id
@@ -44,6 +44,7 @@ def _run(options: argparse.Namespace) -> int:
     check_id("robot", options.robot)
     if options.plot:
         check_picture_suffix(options.plot)
+    check_outputs([options.output, options.plot], [options.log])
     robot_map, taken = _map_log(
         options.log, options.robot, options.scans, odometry=options.odometry == "prior"
     )

@@ -115,11 +115,14 @@ class _Tally:
         self.foreign += isinstance(error, _ForeignLineError)
         self.first = self.first or f"line {line.number}: {error}"
 
-    def report(self, path: Path, on_warning: Callable[[str], None]) -> None:
-        """Raise `FileError` if no scan was usable; warn if some were damaged."""
+    def check(self, path: Path) -> None:
+        """Raise `FileError` if no scan was usable."""
         if not self.hits:
             raise FileError(path, f"{self._why_unusable()}; {EXPECTED}")
-        if self.damaged:
+
+    def warn(self, path: Path, on_warning: Callable[[str], None]) -> None:
+        """Warn if some scans were damaged and others were not."""
+        if self.hits and self.damaged:
             on_warning(f"{path}: dropped {self._damage()}")
 
     def _damage(self) -> str:
@@ -136,18 +139,21 @@ class _Tally:
 
 def _scans(path: Path, odometry: bool, on_warning: Callable[[str], None]) -> Iterator[Scan]:
     tally = _Tally()
-    for line in read_lines(path):
-        tally.lines += 1
-        try:
-            record = parse_line(line)
-        except DamagedLineError as error:
-            tally.add_damaged(line, error)
-            continue
-        if record is not None:
-            scan = _scan(tally.scans, record, odometry)
-            tally.add_scan(scan)
-            yield scan
-    tally.report(path, on_warning)
+    try:
+        for line in read_lines(path):
+            tally.lines += 1
+            try:
+                record = parse_line(line)
+            except DamagedLineError as error:
+                tally.add_damaged(line, error)
+                continue
+            if record is not None:
+                scan = _scan(tally.scans, record, odometry)
+                tally.add_scan(scan)
+                yield scan
+        tally.check(path)
+    finally:  # also where nobody wants the rest
+        tally.warn(path, on_warning)
 
 
 def _scan(index: int, record: LaserRecord, odometry: bool) -> Scan:

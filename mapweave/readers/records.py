@@ -144,6 +144,9 @@ def _stamp(word: bytes) -> float:
     return stamp if math.isfinite(stamp) else math.nan
 
 
+MIN_RESOLUTION = 1e-4  # [rad] finer than any lidar's, and coarse enough to compute with
+
+
 @lru_cache(maxsize=16)
 def beam_angles(start: float, resolution: float, count: int) -> FloatArray:
     """Return the ``(count,)`` directions [rad] from `start` on; shared, so read-only.
@@ -154,7 +157,8 @@ def beam_angles(start: float, resolution: float, count: int) -> FloatArray:
         If there are fewer than two beams, or if they do not ascend within one turn.
     """
     span = resolution * (count - 1)
-    if count < 2 or not (math.isfinite(start) and 0 < span <= 2 * math.pi + resolution):
+    sound = abs(start) <= 2 * math.pi and resolution >= MIN_RESOLUTION  # False for NaN
+    if count < 2 or not (sound and span <= 2 * math.pi + resolution):
         raise DamagedLineError(
             f"{count} beams, {resolution} rad apart, from {start} rad; expected two or more that"
             " ascend within one turn"

@@ -6,7 +6,7 @@ from numpy.random import Generator
 
 from mapweave import se2
 from mapweave.scan import Scan
-from mapweave.visibility import clear_ranges, nearest_beam, seen_through
+from mapweave.visibility import clear_ranges, seen_through
 from tests.mapweave.buildings import AROUND, FRONT, cast, random_pose, rectangle, walls_of
 
 # The sensor stands at (1, 2) in a room 6 m by 4 m and looks along x: the wall ahead is 5 m away.
@@ -50,10 +50,17 @@ def test_space_is_clear_as_far_as_a_beam_and_both_its_neighbours_reach() -> None
     np.testing.assert_array_equal(clear_ranges(scan, 5.5), [1.0, 1.0, 1.0, 4.0, 5.0])
 
 
-def test_every_bearing_has_the_nearest_beam(rng: Generator) -> None:
-    bearing = rng.uniform(-np.pi / 2, np.pi / 2, 200)
-    brute = np.abs(bearing[:, None] - SCAN.angles).argmin(axis=1)
-    np.testing.assert_array_equal(nearest_beam(SCAN, bearing), brute)
+@pytest.mark.parametrize("first", [-np.pi, 0.0, np.pi / 3])
+@pytest.mark.parametrize("beams", [360, 361])
+def test_it_does_not_matter_where_the_turn_of_a_lidar_begins(
+    first: float, beams: int, rng: Generator
+) -> None:
+    """Beams all round, at 5 m: every point nearer is seen through, across the seam as well."""
+    angles = first + np.radians(1.0) * np.arange(beams)
+    scan = Scan(0, 0.0, angles, np.full(beams, 5.0))
+    bearing, distance = rng.uniform(-np.pi, np.pi, 200), rng.uniform(0.5, 4.9, 200)
+    points = distance[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+    assert seen_through(scan, points, 0.0, 20.0).all()
 
 
 def test_nothing_inside_a_room_is_seen_through_from_any_place_in_it_but_its_free_space(
