@@ -1,5 +1,6 @@
 """Runs a team as processes on this machine, from its start to its joint map."""
 
+import logging
 import socket
 import time
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from mapweave_fusion_server.store import Store
 from mapweave_protocol.asking import ask_robot_map
 from mapweave_protocol.assembler import MapAssembler
 from mapweave_protocol.codec import decode
+from mapweave_protocol.errors import MessageError
 from mapweave_protocol.inbox import Inbox
 from mapweave_protocol.messages import JointMapMessage, MapMessage
 from mapweave_protocol.session import open_session
@@ -26,6 +28,8 @@ ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is bus
 POLL = 0.2  # [s] after which a dead process or the end is noticed
 EVERYTHING = "mapweave/@v1/{team}/**"
 CAPACITY = 100_000  # messages waiting to be counted
+
+_log = logging.getLogger(__name__)
 
 
 class TeamTimeoutError(MapweaveError):
@@ -166,9 +170,11 @@ def _start_agent(crew: Crew, plan: Plan, member: Member) -> None:
 
 
 def _listens(host: str, port: int) -> bool:
-    with socket.socket() as probe:
-        probe.settimeout(1.0)
-        return probe.connect_ex((host, port)) == 0
+    try:
+        with socket.create_connection((host.strip("[]"), port), timeout=1.0):
+            return True
+    except OSError:
+        return False
 
 
 def _follow(crew: Crew, inbox: Inbox, recorder: Recorder, display: Display) -> None:
@@ -203,7 +209,7 @@ def _not_at_coordinator(session: zenoh.Session, plan: Plan, recorder: Recorder) 
     missing = []
     for robot in plan.robots:
         status = recorder.statuses[robot]
-        held = ask_robot_map(session, plan.team, robot)
+        held = _ask(session, plan.team, robot)
         is_last = held is not None and (held.boot, held.version) == (
             status.boot,
             status.map_version,
@@ -211,6 +217,15 @@ def _not_at_coordinator(session: zenoh.Session, plan: Plan, recorder: Recorder) 
         if not is_last and status.submaps > 0:
             missing.append(robot)
     return missing
+
+
+def _ask(session: zenoh.Session, team: str, robot: str) -> MapMessage | None:
+    """Return the coordinator's map of `robot`, None as well if the answer is not valid."""
+    try:
+        return ask_robot_map(session, team, robot)
+    except MessageError as error:
+        _log.warning("answer ignored, %s", error)
+        return None
 
 
 def _read_outcome(plan: Plan, recorder: Recorder) -> Outcome:

@@ -2,10 +2,13 @@
 
 import argparse
 import math
+import re
 from pathlib import Path
 
+from mapweave.cli import argument
 from mapweave_deploy.simulation import BUILDERS
 from mapweave_protocol.arguments import DEFAULT_TEAM
+from mapweave_protocol.session import MAX_PORT
 
 DEFAULT_ROBOTS = 3
 
@@ -37,14 +40,14 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seed",
-        type=_natural,
+        type=argument(_natural),
         default=1,
         metavar="S",
         help="another seed furnishes the world otherwise (default 1)",
     )
     parser.add_argument(
         "--robots",
-        type=_positive,
+        type=argument(_positive),
         default=DEFAULT_ROBOTS,
         metavar="N",
         help=f"how many; of several logs, for each (default {DEFAULT_ROBOTS})",
@@ -54,7 +57,7 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
 def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate",
-        type=_rate,
+        type=argument(_rate),
         default="max",
         metavar="X",
         help="play the scans at X times real time, or max (the default)",
@@ -64,12 +67,13 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--listen",
+        type=argument(_endpoint),
         metavar="ENDPOINT",
         help="where the router listens, such as tcp/127.0.0.1:7447 (default: a free port)",
     )
     parser.add_argument(
         "--timeout",
-        type=_seconds,
+        type=argument(_seconds),
         metavar="S",
         help="give up after S seconds (default: never)",
     )
@@ -99,25 +103,33 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
 def _natural(text: str) -> int:
     value = int(text)
     if value < 0:
-        raise argparse.ArgumentTypeError(f"{text}: expected 0 or more")
+        raise ValueError(f"{text}: expected 0 or more")
     return value
 
 
 def _positive(text: str) -> int:
     value = int(text)
     if value < 1:
-        raise argparse.ArgumentTypeError(f"{text}: expected 1 or more")
+        raise ValueError(f"{text}: expected 1 or more")
     return value
 
 
 def _seconds(text: str) -> float:
     value = float(text)
     if not (math.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text}: expected more than 0")
+        raise ValueError(f"{text}: expected more than 0")
     return value
 
 
 def _rate(text: str) -> str:
     if text != "max":
         _seconds(text)
+    return text
+
+
+def _endpoint(text: str) -> str:
+    """Return `text` if it is an endpoint that every process of the team can reach."""
+    match = re.fullmatch(r"tcp/[^\s/#?]+:([0-9]{1,5})", text)
+    if match is None or not 1 <= int(match[1]) <= MAX_PORT:
+        raise ValueError(f"{text}: expected tcp/HOST:PORT, the port from 1 to {MAX_PORT}")
     return text

@@ -5,7 +5,7 @@ import logging
 import sys
 from pathlib import Path
 
-from mapweave.cli import Command
+from mapweave.cli import Command, argument
 from mapweave_fusion_server.coordinator import CoordinatorParameters
 from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
@@ -28,7 +28,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--min-interval",
-        type=_seconds,
+        type=argument(_seconds),
         default=DEFAULT_INTERVAL,
         metavar="S",
         help="least time between two versions [s] unless maps are joined or parted"
@@ -58,7 +58,7 @@ def _run(options: argparse.Namespace) -> int:
 def _seconds(text: str) -> float:
     value = float(text)
     if not 0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text}: expected seconds, 0 or more")
+        raise ValueError(f"{text}: expected seconds, 0 or more")
     return value
 
 

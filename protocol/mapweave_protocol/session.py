@@ -28,7 +28,8 @@ LEASE = 5.0  # [s] after which a robot that fell silent counts as gone
 HEARTBEAT = 0.5  # [s] after which the loss of a publisher's last sample is noticed
 
 # Zenoh would go on trying one that no transport of its own knows.
-_ENDPOINT = re.compile(r"(tcp|udp|tls|quic|ws)/[^\s/]+:[0-9]{1,5}([#?]\S*)?")
+_ENDPOINT = re.compile(r"(tcp|udp|tls|quic|ws)/[^\s/]+:([0-9]{1,5})([#?]\S*)?")
+MAX_PORT = 65535
 
 Mode: TypeAlias = Literal["client", "peer"]
 OnSample: TypeAlias = Callable[[zenoh.Sample], None]
@@ -89,7 +90,7 @@ def _common_settings() -> dict[str, object]:
 
 def _config(settings: Mapping[str, object], endpoints: Sequence[str]) -> zenoh.Config:
     config = zenoh.Config()
-    if not all(_ENDPOINT.fullmatch(endpoint) for endpoint in endpoints):
+    if not all(_is_endpoint(endpoint) for endpoint in endpoints):
         raise EndpointError(tuple(endpoints))
     try:
         for path, value in settings.items():
@@ -97,6 +98,11 @@ def _config(settings: Mapping[str, object], endpoints: Sequence[str]) -> zenoh.C
     except zenoh.ZError as error:
         raise EndpointError(tuple(endpoints)) from error
     return config
+
+
+def _is_endpoint(text: str) -> bool:
+    match = _ENDPOINT.fullmatch(text)
+    return match is not None and int(match[2]) <= MAX_PORT
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """``mapweave watch``: what a team does, told as it happens."""
 
 import argparse
+import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -17,6 +18,7 @@ from mapweave.cli import Command
 from mapweave_protocol.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.asking import ask_joint_maps
 from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE, MapAssembler
+from mapweave_protocol.errors import MessageError
 from mapweave_protocol.inbox import (
     Arrival,
     Inbox,
@@ -40,6 +42,7 @@ HISTORY = {MAP: MESSAGES_TO_COMPLETE, STATUS: 1, ALIGNMENT: 1, JOINT_MAP: 1}
 
 M = TypeVar("M", bound=Message)
 Teller = Callable[[Arrival], Iterator[str]]
+_log = logging.getLogger(__name__)
 
 
 class Watcher:
@@ -95,11 +98,19 @@ def watch(
     inbox = Inbox()
     with open_session(endpoints, on_wait=on_wait) as session, ExitStack() as subscribers:
         _subscribe(session, team, inbox, subscribers)
-        for latest in ask_joint_maps(session, team, JointQuery()):
+        for latest in _ask_latest(session, team):
             yield from watcher.tell_joint(latest)
         while True:
             arrival = inbox.get(POLL)
             yield from watcher.tell(arrival) if arrival else (None,)
+
+
+def _ask_latest(session: zenoh.Session, team: str) -> list[JointMapMessage]:
+    try:
+        return ask_joint_maps(session, team, JointQuery())
+    except MessageError as error:
+        _log.warning("answer ignored, %s", error)
+        return []
 
 
 def _subscribe(session: zenoh.Session, team: str, inbox: Inbox, stack: ExitStack) -> None:

@@ -27,7 +27,10 @@ def test_a_team_that_is_no_id_ends_the_command_with_one_line(
 
 
 @pytest.mark.parametrize("interval", ["-1", "nan", "inf", "soon"])
-def test_an_interval_that_is_none_is_wrong_usage(interval: str) -> None:
+def test_an_interval_that_is_none_is_wrong_usage(
+    interval: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["server", "--min-interval", interval])
     assert ended.value.code == 2
+    assert "_seconds" not in capsys.readouterr().err

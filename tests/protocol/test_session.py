@@ -237,7 +237,10 @@ def test_a_full_inbox_drops_the_oldest(endpoint: str, team: str) -> None:
     assert [arrival and arrival.payload for arrival in arrivals] == [b"7", b"8", b"9", None]
 
 
-@pytest.mark.parametrize("address", ["localhost:7447", "tcp/localhost", "foo/localhost:1", "", "*"])
+@pytest.mark.parametrize(
+    "address",
+    ["localhost:7447", "tcp/localhost", "foo/localhost:1", "", "*", "tcp/localhost:65536"],
+)
 def test_what_is_no_endpoint_is_refused_at_once(address: str) -> None:
     with pytest.raises(EndpointError), open_session([address]):
         pass

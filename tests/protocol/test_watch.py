@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
+import zenoh
 
 from mapweave.maps import Alignment, Decision, JointMap, RobotMap
 from mapweave_protocol import keys
@@ -22,7 +24,7 @@ from mapweave_protocol.messages import (
 )
 from mapweave_protocol.session import declare_joint_publisher, declare_map_publisher, open_session
 from mapweave_protocol.story import Story
-from mapweave_protocol.watch import Watcher
+from mapweave_protocol.watch import Watcher, watch
 
 MakeMap = Callable[..., RobotMap]
 MakeJoint = Callable[..., JointMap]
@@ -123,3 +125,18 @@ def test_the_command_tells_what_happens_line_by_line(
             lines = sorted(watching.stdout.readline() for _ in range(3))
             watching.send_signal(signal.SIGTERM)
     assert [line.split()[:2] for line in lines] == [["a", "is"], ["a:", "2"], ["joint", "map"]]
+
+
+def test_an_answer_that_is_no_joint_map_is_ignored(
+    endpoint: str, team: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    key = keys.JOINT_QUERY.build(team=team)
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply(key, b"junk")
+
+    with open_session([endpoint]) as session, session.declare_queryable(key, answer):
+        story = watch(team, [endpoint], Watcher(), lambda: None)
+        assert next(iter(story)) is None
+    assert "answer ignored" in caplog.text
