@@ -288,7 +288,7 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
         (MAP, ["submaps", 0, "pose", 1], float("nan"), "submaps[0].pose[1]", "finite number"),
         (MAP, ["submaps", 0, "pose", 2], float("inf"), "submaps[0].pose[2]", "finite number"),
         (MAP, ["submaps", 0, "pose", 0], 1e9, "submaps[0].pose[0]", "less than"),
-        (MAP, ["submaps", 0, "polylines", 0, 0], [0, 0, 1e5, 0], "submaps[0].polylines[0][0]", "1000 m"),
+        (MAP, ["submaps", 0, "polylines", 0, 0], [0, 0, 1e5, 0], "submaps[0].polylines", "1000 m"),
         (MAP, ["submaps", 0, "pose"], [1, 2], "submaps[0].pose[2]", "required"),
         (MAP, ["submaps", 0, "polylines", 1], [], "submaps[0].polylines[1]", "at least 1 item"),
         (MAP, ["submaps", 0, "support", 1], [1, 1], "submaps[0]", "support[1] has 2 numbers, exp"),
