@@ -21,6 +21,7 @@ MAX_SCANS = 100_000  # of one submap
 MAX_SUPPORT = 2**31
 DIGEST_SIZE = 8  # [bytes]
 MAX_BYTES = 8 * 2**20  # of one packed array
+MAX_WALL = 100_000.0  # [m] of one line map; comparing maps takes time and memory by the metre
 
 
 class PackedLines(WireModel):
@@ -80,6 +81,9 @@ class PackedLines(WireModel):
         if len(points) % 2:
             raise ValueError("a segment without an end")
         segments = packing.unquantise(points.reshape(-1, 4), packing.PER_METRE, reach)
+        wall = float(np.hypot(*(segments[:, 2:] - segments[:, :2]).T).sum())
+        if wall > MAX_WALL:
+            raise ValueError(f"{wall:.0f} m of wall, expected at most {MAX_WALL:.0f} m")
         if np.any(np.all(segments[:, :2] == segments[:, 2:], axis=1)):
             raise ValueError("a segment without length")
         return segments
