@@ -19,7 +19,8 @@ SEGMENTS = 180_000  # of random numbers: four submaps fit into a message, eight 
 
 def _submap(number: int) -> Submap:
     rng = np.random.default_rng(number)
-    segments = rng.uniform(-999, 999, (SEGMENTS, 4))
+    starts = rng.uniform(-900, 900, (SEGMENTS, 2))
+    segments = np.hstack([starts, starts + rng.uniform(0.1, 0.4, (SEGMENTS, 2))])
     support = rng.integers(0, 2**31, SEGMENTS)
     lines = LineMap(segments, np.arange(SEGMENTS), support, ())
     return Submap(number, 0, np.zeros(3), lines, Trajectory.empty())
