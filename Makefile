@@ -33,6 +33,7 @@ bench: $(STAMP)
 
 bench-map: $(STAMP)
 	$(BIN)/python -m tests.benchmarks map
+	$(BIN)/python -m tests.benchmarks kidnap
 
 bench-fusion: $(STAMP)
 	$(BIN)/python -m tests.benchmarks fusion

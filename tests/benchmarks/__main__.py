@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks [figure2 | map | fusion | confidence | wire]``."""
+"""``python -m tests.benchmarks [figure2 | map | kidnap | fusion | confidence | wire]``."""
 
 import argparse
 import io
@@ -6,7 +6,7 @@ import sys
 import time
 from typing import Protocol
 
-from tests.benchmarks import figure2, fit_confidence, fusion, mapping, wire
+from tests.benchmarks import figure2, fit_confidence, fusion, kidnap, mapping, wire
 
 
 class Benchmark(Protocol):
@@ -24,6 +24,7 @@ class Benchmark(Protocol):
 BENCHMARKS: dict[str, Benchmark] = {
     "figure2": figure2,
     "map": mapping,
+    "kidnap": kidnap,
     "fusion": fusion,
     "confidence": fit_confidence,
     "wire": wire,
