@@ -28,7 +28,8 @@ FARTHER = 3.0  # [m] jumped at least: a shorter way may have been a step
 DISTANCE, TURN = 1.0, np.radians(10.0)  # [m], [rad] off which a scan is misplaced
 MOST = 0.5  # share of the scans that must be back where they belong: rejoined
 STRAY = 5  # scans misplaced in a row of a trial that make a wrong place; fewer are single ones
-HEAD = ["log", "trials", "said lost", "rejoined", "wrong places", "strays", "median m", "worst m"]
+HEAD = ["log", "trials", "noticed", "said lost", "rejoined", "wrong places", "strays"]
+HEAD += ["median m", "worst m"]
 
 Where = Mapping[int, tuple[int, FloatArray]]
 
@@ -45,6 +46,8 @@ class Trial:
         The first scan after the jump.
     jump
         [m] between it and the last scan before, as mapped.
+    noticed
+        Whether the first scan after the jump fitted nowhere when it came.
     lost_after
         How many scans after the jump the robot was said to be lost; None if it never was.
     placed, back
@@ -64,6 +67,7 @@ class Trial:
     trial: int
     start: int
     jump: float
+    noticed: bool
     lost_after: int | None
     placed: int
     back: int
@@ -76,7 +80,10 @@ class Trial:
 
     @property
     def said_lost(self) -> bool:
-        """Whether the jump was noticed when it happened."""
+        """Whether the robot was said to be lost as soon as patience allows.
+
+        One that the first scans did not fit, and that then found itself, never was.
+        """
         return self.lost_after is not None and self.lost_after <= self.patience
 
     @property
@@ -131,10 +138,7 @@ def try_once(name: str, scans: Sequence[Scan], mapper: Mapper, number: int) -> T
     """Kidnap a copy of `mapper`, by the draw that `number` seeds, and judge what it makes of it."""
     carried = copy.deepcopy(mapper)
     start, jump = draw(carried.robot_map(), len(scans), number)
-    lost_after = None
-    for k, scan in enumerate(after_the_jump(scans, start)):
-        if carried.add(scan).lost and lost_after is None:
-            lost_after = k + 1
+    said = [carried.add(scan) for scan in after_the_jump(scans, start)]
     where = whereabouts(carried.finish())
     errors = off_first_place(where, len(scans), start)
     bad = [distance > DISTANCE or turn > TURN for _, distance, turn in errors]
@@ -144,7 +148,8 @@ def try_once(name: str, scans: Sequence[Scan], mapper: Mapper, number: int) -> T
         trial=number,
         start=start,
         jump=jump,
-        lost_after=lost_after,
+        noticed=not said[0].placed,
+        lost_after=next((k for k, one in enumerate(said, start=1) if one.lost), None),
         placed=sum(index >= len(scans) for index in where),
         back=len(errors),
         known=sum(start + k in where for k in range(LENGTH)),
@@ -218,7 +223,8 @@ def _longest_run(flags: Sequence[bool]) -> int:
 
 def tell_one(trial: Trial) -> str:
     """Return a line on one trial."""
-    lost = "never said lost" if trial.lost_after is None else f"lost after {trial.lost_after}"
+    lost = "noticed" if trial.noticed else "not noticed"
+    lost += ", never lost" if trial.lost_after is None else f", lost after {trial.lost_after}"
     verdict = "wrong place" if trial.wrong else "rejoined" if trial.rejoined else "apart"
     return (
         f"{trial.log} trial {trial.trial}: from scan {trial.start}, {trial.jump:.1f} m off: {lost},"
@@ -237,6 +243,7 @@ def tell(trials: Sequence[Trial]) -> str:
             [
                 log,
                 str(len(of_log)),
+                str(sum(trial.noticed for trial in of_log)),
                 str(sum(trial.said_lost for trial in of_log)),
                 str(len(rejoined)),
                 str(sum(trial.wrong for trial in of_log)),

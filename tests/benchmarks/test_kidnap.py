@@ -72,7 +72,7 @@ def test_nothing_in_the_scans_tells_of_the_jump() -> None:
 
 
 def trial(back: int, longest: int, lost_after: int | None) -> Trial:
-    return Trial("log", 0, 0, 9.0, lost_after, 100, back, 100, longest, longest, 0.1, 0.2, 5)
+    return Trial("log", 0, 0, 9.0, True, lost_after, 100, back, 100, longest, longest, 0.1, 0.2, 5)
 
 
 @pytest.mark.parametrize(
@@ -93,4 +93,4 @@ def test_a_robot_rejoined_when_most_scans_are_back_and_no_run_of_them_is_misplac
 
 def test_the_table_tells_of_a_log_where_no_robot_rejoined() -> None:
     told = tell([trial(0, 0, 5)]).splitlines()[1]
-    assert " ".join(told.split()) == "log 1 1 0 0 0 - -"
+    assert " ".join(told.split()) == "log 1 1 1 0 0 0 - -"
