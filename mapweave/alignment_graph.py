@@ -1,29 +1,31 @@
 """Which alignments to rely on, and the poses that follow.
 
-Accepted alignments are links between components. The surest links that do not close a circle
-carry the poses; a link that closes one must agree with those, or is set aside and named. The
-poses are then fitted to all links that agree.
+Accepted alignments are links between components. The most probable explanation of them all says
+which are right; the others are set aside and named. The poses are fitted to those that are right.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.optimize import least_squares
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
+from mapweave.cuts import groups
+from mapweave.cycles import Edge, misfit, poses_along
+from mapweave.explanations import Explanation, ExplanationParameters, explain
 from mapweave.maps import Alignment
+from mapweave.pose_graph import Link, optimise
+from mapweave.reliance import component_confidence, rely
 
 
 class GraphParameters(BaseModel):
-    """When links agree."""
+    """How alignments are weighed against each other, and the poses fitted to them."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    max_distance: float = Field(0.75, gt=0, description="[m] a link may differ from the others'")
-    max_turn: float = Field(0.09, gt=0, description="[rad] a link may differ: 5°")
+    explanations: ExplanationParameters = ExplanationParameters()
     sigma: float = Field(0.1, gt=0, description="[m] of an alignment's translation")
     turn_sigma: float = Field(0.01, gt=0, description="[rad] of an alignment's rotation")
 
@@ -37,7 +39,7 @@ class Cluster:
     poses
         Component name to its (3,) pose; the first has the identity.
     confidence
-        Of the weakest link needed; 1 for one component alone.
+        Of the weakest part needed, strengthened by cycles; 1 for one component alone.
     """
 
     poses: Mapping[str, FloatArray]
@@ -45,119 +47,126 @@ class Cluster:
 
 
 def cluster_components(
-    names: Sequence[str], alignments: Sequence[Alignment], parameters: GraphParameters
+    names: Sequence[str],
+    alignments: Sequence[Alignment],
+    parameters: GraphParameters,
+    middles: Mapping[str, FloatArray] | None = None,
 ) -> tuple[list[Cluster], tuple[Alignment, ...]]:
     """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
 
     Alignments that name components not in `names` are left out.
+
+    Parameters
+    ----------
+    middles
+        For each component the (2,) middle of its wall [m]. What alignments differ by is measured
+        there, because it depends on no frame; where none is given, at the component's origin.
     """
     known = set(names)
     alignments = [a for a in alignments if a.reference in known and a.other in known]
-    links = [a for a in alignments if a.decision == "accepted"]
-    links.sort(key=lambda a: (-a.confidence, -a.evidence.get("score", 0.0), a.reference, a.other))
-    tree = _spanning_links(names, links)
-    poses, roots = _poses_along(names, tree)
-    agreeing = [a for a in links if _agrees(a, poses, parameters)]
-    aside = {(a.reference, a.other) for a in links} - {(a.reference, a.other) for a in agreeing}
-    judged = tuple(_set_aside(a) if (a.reference, a.other) in aside else a for a in alignments)
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        groups.setdefault(roots[name], []).append(name)
-    clusters = [_cluster(group, poses, tree, agreeing, parameters) for group in groups.values()]
-    return sorted(clusters, key=lambda c: -len(c.poses)), judged
+    graph = _Graph(names, alignments, parameters, middles or {})
+    judged = tuple(graph.judge(alignment) for alignment in alignments)
+    return sorted(graph.clusters(), key=lambda c: -len(c.poses)), judged
 
 
-def _spanning_links(names: Sequence[str], links: Sequence[Alignment]) -> list[Alignment]:
-    """Kruskal's forest over links sorted from the surest."""
-    group = {name: name for name in names}
+class _Graph:
+    """The accepted alignments between numbered components, in frames at their middles."""
 
-    def root(name: str) -> str:
-        while group[name] != name:
-            name = group[name]
-        return name
+    def __init__(
+        self,
+        names: Sequence[str],
+        alignments: Sequence[Alignment],
+        parameters: GraphParameters,
+        middles: Mapping[str, FloatArray],
+    ) -> None:
+        self._names, self._parameters = names, parameters
+        self._number = {name: number for number, name in enumerate(names)}
+        self._middles = np.array([[*middles.get(name, (0.0, 0.0)), 0.0] for name in names])
+        links = [a for a in alignments if a.decision == "accepted" and a.reference != a.other]
+        # In an order of their own, so that the order in which they came changes nothing.
+        links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
+        self._edge_of = {id(link): k for k, link in enumerate(links)}
+        self._edges = [self._edge(link) for link in links]
+        p = parameters.explanations
+        self._explanations: list[Explanation] = explain(len(names), self._edges, p)
+        self._right = rely(len(names), self._edges, self._explanations)
 
-    tree = []
-    for link in links:
-        a, b = root(link.reference), root(link.other)
-        if a != b:
-            group[max(a, b)] = min(a, b)
-            tree.append(link)
-    return tree
+    def _edge(self, link: Alignment) -> Edge:
+        first, second = self._number[link.reference], self._number[link.other]
+        there = se2.compose(link.transform, self._middles[second])
+        return Edge(first, second, se2.between(self._middles[first], there), link.confidence)
+
+    def clusters(self) -> list[Cluster]:
+        """Return the clusters, in the order of their first components."""
+        count, p = len(self._names), self._parameters.explanations
+        return [
+            Cluster(
+                self._poses(group),
+                component_confidence(group, count, self._edges, self._right, self._explanations, p),
+            )
+            for group in groups(count, self._edges, self._right)
+        ]
+
+    def judge(self, alignment: Alignment) -> Alignment:
+        """Return `alignment`, ambiguous if it was accepted and is not relied on."""
+        edge = self._edge_of.get(id(alignment))
+        if edge is None or edge in self._right:
+            return alignment
+        reason = f"set aside: {self._contradiction(edge)}; {alignment.reason}"
+        return replace(alignment, decision="ambiguous", reason=reason)
+
+    def _contradiction(self, k: int) -> str:
+        """What alignment `k` contradicts, in words."""
+        edge = self._edges[k]
+        present = sorted(self._right)
+        poses, paths = poses_along(edge.first, len(self._names), self._edges, present)
+        path = paths[edge.second]
+        if path < 0:
+            return "contradicts others, and nothing tells for sure which is wrong"
+        off = misfit(edge.transform, poses[edge.first], poses[edge.second])
+        distance, turn = float(np.hypot(off[0], off[1])), float(np.degrees(abs(off[2])))
+        others = sorted(self._tell(other) for other in present if path >> other & 1)
+        return f"{distance:.1f} m and {turn:.0f}° off what {_enumerate(others)} say"
+
+    def _tell(self, k: int) -> str:
+        edge = self._edges[k]
+        return f"{self._names[edge.first]}-{self._names[edge.second]}"
+
+    def _poses(self, group: Sequence[int]) -> dict[str, FloatArray]:
+        """Poses of the components of `group`, the first in its own frame."""
+        inside = [k for k in sorted(self._right) if self._edges[k].first in group]
+        poses, _ = poses_along(group[0], len(self._names), self._edges, inside)
+        fitted = poses[list(group)]
+        if len(inside) >= len(group):  # a tree fits as it stands
+            fitted = self._fitted(group, inside, fitted)
+        middles = self._middles[list(group)]
+        frames = se2.compose(fitted, se2.inverse(middles))
+        frames = se2.between(frames[0], frames)
+        frames[0] = 0.0
+        return {self._names[node]: pose for node, pose in zip(group, frames, strict=True)}
+
+    def _fitted(self, group: Sequence[int], inside: Sequence[int], start: FloatArray) -> FloatArray:
+        """(n, 3) poses that fit all edges `inside`, from `start`."""
+        p = self._parameters
+        place = {node: k for k, node in enumerate(group)}
+        covariance = np.diag([p.sigma**2, p.sigma**2, p.turn_sigma**2])
+        links = [
+            Link(place[e.first], place[e.second], e.transform, covariance, trusted)
+            for e, trusted in self._with_bridges(inside)
+        ]
+        return optimise(start, links)[0]
+
+    def _with_bridges(self, inside: Sequence[int]) -> Iterator[tuple[Edge, bool]]:
+        """Yield the edges `inside`, and of each whether all hangs on it: nothing can refute it."""
+        count = len(self._names)
+        parts = len(groups(count, self._edges, inside))
+        for k in inside:
+            rest = [other for other in inside if other != k]
+            yield self._edges[k], len(groups(count, self._edges, rest)) > parts
 
 
-def _poses_along(
-    names: Sequence[str], tree: Sequence[Alignment]
-) -> tuple[dict[str, FloatArray], dict[str, str]]:
-    """Pose of each component in the frame of its group's first, and that first one's name."""
-    neighbours: dict[str, list[tuple[str, FloatArray]]] = {name: [] for name in names}
-    for link in tree:
-        neighbours[link.reference].append((link.other, link.transform))
-        neighbours[link.other].append((link.reference, se2.inverse(link.transform)))
-    poses: dict[str, FloatArray] = {}
-    roots: dict[str, str] = {}
-    for first in names:
-        if first in poses:
-            continue
-        poses[first], roots[first] = np.zeros(3), first
-        open_ends = [first]
-        while open_ends:
-            here = open_ends.pop()
-            for there, step in neighbours[here]:
-                if there not in poses:
-                    poses[there] = se2.compose(poses[here], step)
-                    roots[there] = first
-                    open_ends.append(there)
-    return poses, roots
-
-
-def _error(link: Alignment, first: FloatArray, second: FloatArray) -> FloatArray:
-    """(3,) what `link` and the poses of its two components disagree in."""
-    return se2.between(link.transform, se2.between(first, second))
-
-
-def _agrees(link: Alignment, poses: Mapping[str, FloatArray], p: GraphParameters) -> bool:
-    x, y, turn = _error(link, poses[link.reference], poses[link.other])
-    return bool(np.hypot(x, y) <= p.max_distance and abs(turn) <= p.max_turn)
-
-
-def _set_aside(link: Alignment) -> Alignment:
-    return replace(
-        link, decision="ambiguous", reason=f"set aside: contradicts surer alignments; {link.reason}"
-    )
-
-
-def _cluster(
-    group: Sequence[str],
-    poses: Mapping[str, FloatArray],
-    tree: Sequence[Alignment],
-    agreeing: Sequence[Alignment],
-    p: GraphParameters,
-) -> Cluster:
-    inside = [a for a in agreeing if a.reference in group]
-    needed = [a.confidence for a in tree if a.reference in group]
-    return Cluster(_fitted(group, poses, inside, p), min(needed, default=1.0))
-
-
-def _fitted(
-    group: Sequence[str],
-    poses: Mapping[str, FloatArray],
-    links: Sequence[Alignment],
-    p: GraphParameters,
-) -> dict[str, FloatArray]:
-    """Fit the poses to all links; the first stays where it is. A tree fits as it stands."""
-    start = {name: poses[name] for name in group}
-    if len(links) < len(group):
-        return start
-    place = {name: k for k, name in enumerate(group)}
-    scale = np.array([p.sigma, p.sigma, p.turn_sigma])
-
-    def residuals(free: FloatArray) -> FloatArray:
-        at = np.vstack([poses[group[0]], free.reshape(-1, 3)])
-        return np.concatenate(
-            [_error(a, at[place[a.reference]], at[place[a.other]]) / scale for a in links]
-        )
-
-    free = np.concatenate([poses[name] for name in group[1:]])
-    fitted = least_squares(residuals, free, loss="soft_l1").x.reshape(-1, 3)
-    fitted[:, 2] = se2.wrap(fitted[:, 2])
-    return {group[0]: poses[group[0]], **dict(zip(group[1:], fitted, strict=True))}
+def _enumerate(items: Sequence[str]) -> str:
+    """Return `items` in words; of many the first and how many more there are."""
+    if len(items) > 3:
+        return f"{', '.join(items[:2])} and {len(items) - 2} more"
+    return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
