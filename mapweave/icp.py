@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 
 from mapweave import se2
 from mapweave.arrays import BoolArray, FloatArray, IntArray
-from mapweave.surface import Surface
+from mapweave.surface import Surface, join_surfaces
 
 
 class IcpParameters(BaseModel):
@@ -89,12 +89,26 @@ def align(
     prior: FloatArray | None = None,
     corresponding: BoolArray | None = None,
 ) -> Fit:
-    """Move `moving` from `start` (3,) until it lies on `target`.
+    """Move `moving` from `start` (3,) until it lies on `target`; see `align_all`."""
+    return align_all(moving, target, start[None], parameters, prior, corresponding)[0]
+
+
+def align_all(
+    moving: Surface,
+    target: Target,
+    starts: FloatArray,
+    parameters: IcpParameters,
+    prior: FloatArray | None = None,
+    corresponding: BoolArray | None = None,
+) -> list[Fit]:
+    """Move `moving` from each of `starts` (k, 3) until it lies on `target`.
+
+    All at once, because one question to the tree about many points is much faster than many.
 
     Parameters
     ----------
     prior
-        (3, 3) information [1/m², 1/rad²] that holds the pose at `start`; decides the directions
+        (3, 3) information [1/m², 1/rad²] that holds a pose at its start; decides the directions
         that the surfaces leave open.
     corresponding
         (target's polylines, moving one's polylines) which pairs of polylines may pull. A point's
@@ -102,24 +116,28 @@ def align(
         either is on none, the pair is left out, and no farther partner is looked for. Without
         it all pairs pull.
     """
-    pose = np.array(start, dtype=float)
-    held = np.zeros((3, 3)) if prior is None else prior
+    poses = np.array(starts, dtype=float)
+    information = np.zeros((len(poses), 3, 3))
+    weakest = np.diag([1e-6, 1e-6, 1e-6])  # [1/m², 1/rad²] so that a start without pairs stays
+    held = weakest if prior is None else prior + weakest
     scale = parameters.start_scale
-    information = np.zeros((3, 3))
+    moves = np.arange(len(poses))  # those that have not settled
     for _ in range(parameters.max_iterations):
-        normal_matrix, gradient = _linearise(moving, target, pose, scale, parameters, corresponding)
-        information = normal_matrix
-        system = normal_matrix / parameters.noise**2 + held + np.diag([1e-6, 1e-6, 1e-6])
-        error = pose - start
-        error[2] = se2.wrap(error[2])
-        step = -np.linalg.solve(system, gradient / parameters.noise**2 + held @ error)
-        pose = pose + step
-        settled = np.abs(step).max() < parameters.converged
-        if settled and scale <= parameters.end_scale:
-            break
+        pairs = _pairs(moving, target, poses[moves], scale, parameters, corresponding)
+        information[moves], gradient = _linearise(pairs, poses[moves], scale)
+        error = poses[moves] - starts[moves]
+        error[:, 2] = se2.wrap(error[:, 2])
+        system = information[moves] / parameters.noise**2 + held
+        force = gradient / parameters.noise**2 + error @ held
+        step = -np.linalg.solve(system, force[..., None])[..., 0]
+        poses[moves] += step
+        if scale <= parameters.end_scale:
+            moves = moves[np.abs(step).max(axis=1) >= parameters.converged]
+            if len(moves) == 0:
+                break
         scale = max(parameters.end_scale, scale * parameters.shrink)
-    pose[2] = se2.wrap(pose[2])
-    return Fit(pose, information)
+    poses[:, 2] = se2.wrap(poses[:, 2])
+    return [Fit(pose, held_by) for pose, held_by in zip(poses, information, strict=True)]
 
 
 def partners(
@@ -139,26 +157,63 @@ def _features(surface: Surface, parameters: IcpParameters) -> FloatArray:
     return np.hstack([surface.points, parameters.normal_weight * surface.normals])
 
 
-def _linearise(
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Points and their partners, n for each of k poses; those without a partner weigh nothing.
+
+    Attributes
+    ----------
+    points
+        (k, n, 2) moving points, target's frame [m].
+    distance
+        (k, n) to the partner, in place and in normal [m]; infinite without one.
+    residual
+        (k, n) across the partner's surface [m].
+    normals
+        (k, n, 2) of the partners.
+    """
+
+    points: FloatArray
+    distance: FloatArray
+    residual: FloatArray
+    normals: FloatArray
+
+
+def _pairs(
     moving: Surface,
     target: Target,
-    pose: FloatArray,
+    poses: FloatArray,
     scale: float,
     parameters: IcpParameters,
     corresponding: BoolArray | None,
-) -> tuple[FloatArray, FloatArray]:
-    """Normal matrix (3, 3) and gradient (3,) of the robust point-to-line cost at `pose`."""
-    placed = moving.moved(pose)
+) -> _Pairs:
+    """Find the partners of all points of `moving` at each of `poses` (k, 3)."""
+    placed = join_surfaces([moving.moved(pose) for pose in poses])
     distance, index = partners(placed, target, parameters, 3 * scale)
-    paired = np.isfinite(distance)
+    index[index == len(target.surface)] = 0  # any: an infinite distance weighs nothing
     if corresponding is not None:
-        theirs, ours = target.surface.polyline[index[paired]], moving.polyline[paired]
-        paired[paired] = corresponding[theirs, ours] & (theirs >= 0) & (ours >= 0)
-    points, index = placed.points[paired], index[paired]
+        theirs, ours = target.surface.polyline[index], placed.polyline
+        pulls = corresponding[theirs, ours] & (theirs >= 0) & (ours >= 0)
+        distance[~pulls] = np.inf
     normals = target.surface.normals[index]
-    residual = np.einsum("ij,ij->i", normals, points - target.surface.points[index])
-    weight = 1 / (1 + (distance[paired] / scale) ** 2) ** 2  # Geman-McClure
-    arm = points - pose[:2]
-    jacobian = np.column_stack([normals, normals[:, 1] * arm[:, 0] - normals[:, 0] * arm[:, 1]])
-    weighted = jacobian * weight[:, None]
-    return weighted.T @ jacobian, weighted.T @ residual
+    residual = np.einsum("ij,ij->i", normals, placed.points - target.surface.points[index])
+    shape = (len(poses), len(moving))
+    return _Pairs(
+        placed.points.reshape(*shape, 2),
+        distance.reshape(shape),
+        residual.reshape(shape),
+        normals.reshape(*shape, 2),
+    )
+
+
+def _linearise(pairs: _Pairs, poses: FloatArray, scale: float) -> tuple[FloatArray, FloatArray]:
+    """Normal matrices (k, 3, 3), gradients (k, 3) of the robust point-to-line cost at `poses`."""
+    weight = 1 / (1 + (pairs.distance / scale) ** 2) ** 2  # Geman-McClure
+    arm = pairs.points - poses[:, None, :2]
+    normals = pairs.normals
+    turning = normals[..., 1] * arm[..., 0] - normals[..., 0] * arm[..., 1]
+    jacobian = np.concatenate([normals, turning[..., None]], axis=-1)
+    weighted = jacobian * weight[..., None]
+    gradient = np.einsum("kni,kn->ki", weighted, pairs.residual)
+    normal_matrix: FloatArray = weighted.transpose(0, 2, 1) @ jacobian
+    return normal_matrix, gradient

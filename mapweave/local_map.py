@@ -119,32 +119,52 @@ class LocalMap:
             self._raster = NearnessRaster.of(self.target.surface.points, centre[:2], p)
         return self._raster
 
-    def evidence(self, scan: Scan, surface: Surface, pose: FloatArray) -> Evidence:
-        """Return what speaks for and against `scan`, with oriented points `surface`, at `pose`."""
-        p = self._parameters
-        placed = surface.moved(pose)
-        distance, _ = partners(placed, self.target, p.icp, p.overlap)
-        explained = np.isfinite(distance)
-        contradicted = ~explained
-        open_points = placed.points[~explained]
-        contradicted[~explained] = self._free_before(open_points, pose)
-        known = se2.transform_points(se2.inverse(pose), self.target.surface.points[::3])
-        in_sight = np.hypot(*known.T) < p.sight
-        through = seen_through(scan, known[in_sight], p.clearance, p.sight)
-        return Evidence(
-            float(explained.mean()),
-            float(contradicted.mean()),
-            float(through.mean()) if len(through) else 0.0,
-        )
+    def evidence(self, scan: Scan, surface: Surface, poses: FloatArray) -> list[Evidence]:
+        """Return what speaks for and against `scan` at each of `poses` (k, 3).
 
-    def _free_before(self, points: FloatArray, pose: FloatArray) -> BoolArray:
-        """(n,) which `points`, tracking frame, the keyframes around `pose` saw through."""
+        Parameters
+        ----------
+        surface
+            The oriented points of `scan`, sensor frame.
+        """
         p = self._parameters
-        near = sorted(self._keyframes, key=lambda k: float(np.hypot(*(k.pose - pose)[:2])))
-        free = np.zeros(len(points), dtype=np.bool_)
-        for keyframe in near[: p.witnesses]:
-            local = se2.transform_points(se2.inverse(keyframe.pose), points)
-            free |= seen_through(keyframe.scan, local, p.clearance, p.sight)
+        placed = join_surfaces([surface.moved(pose) for pose in poses])
+        distance, _ = partners(placed, self.target, p.icp, p.overlap)
+        shape = (len(poses), len(surface))
+        explained = np.isfinite(distance).reshape(shape)
+        contradicted = ~explained & self._free_before(placed.points.reshape(*shape, 2), poses)
+        through = self._seen_through(scan, poses)
+        shares = zip(explained.mean(axis=1), contradicted.mean(axis=1), through, strict=True)
+        return [Evidence(float(e), float(c), float(t)) for e, c, t in shares]
+
+    def _seen_through(self, scan: Scan, poses: FloatArray) -> FloatArray:
+        """(k,) share of the known points in sight that `scan` saw through from each pose."""
+        p = self._parameters
+        known = self.target.surface.points[::3]
+        middle = poses[:, :2].mean(axis=0)
+        spread = float(np.hypot(*(poses[:, :2] - middle).T).max())
+        known = known[np.hypot(*(known - middle).T) < p.sight + spread]
+        shares = np.zeros(len(poses))
+        for k, pose in enumerate(poses):
+            local = se2.transform_points(se2.inverse(pose), known)
+            in_sight = np.hypot(*local.T) < p.sight
+            if in_sight.any():
+                through = seen_through(scan, local[in_sight], p.clearance, p.sight)
+                shares[k] = through.mean()
+        return shares
+
+    def _free_before(self, points: FloatArray, poses: FloatArray) -> BoolArray:
+        """(k, n) which `points` (k, n, 2) were seen through by the keyframes about their pose."""
+        p = self._parameters
+        places = np.array([keyframe.pose[:2] for keyframe in self._keyframes])
+        distance = np.hypot(*(places[:, None] - poses[None, :, :2]).T)
+        asked = np.argsort(distance, axis=1, kind="stable")[:, : p.witnesses]
+        free = np.zeros(points.shape[:2], dtype=np.bool_)
+        for k in np.unique(asked):
+            keyframe, of = self._keyframes[int(k)], (asked == k).any(axis=1)
+            local = se2.transform_points(se2.inverse(keyframe.pose), points[of])
+            through = seen_through(keyframe.scan, local.reshape(-1, 2), p.clearance, p.sight)
+            free[of] |= through.reshape(local.shape[:2])
         return free
 
     def _is_news(self, pose: FloatArray) -> bool:

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.correspondence import CorrespondenceParameters, correspond
-from mapweave.icp import Target, align
+from mapweave.icp import Target, align, align_all
 from mapweave.local_map import Evidence, LocalMap, LocalMapParameters
 from mapweave.maps import LineMap
 from mapweave.observation import Observation
@@ -113,7 +113,7 @@ class Tracker:
         """Find the pose of an older scan about `near` (3,), leaving the track as it is."""
         p = self.parameters
         starts = self._local.search(seen.surface.points, near, np.pi)
-        found = [self._aligned(seen, start) for start in np.vstack([near, starts])]
+        found = self._aligned(seen, np.vstack([near, starts]))
         best = max(found, key=lambda tracked: self._value(tracked, near[None]))
         return best if best.evidence.score >= p.acceptable else None
 
@@ -136,7 +136,7 @@ class Tracker:
         ]
         found: list[Tracked] = []
         for enough, starts in stages:
-            found += [t for s in starts() if self._is_reached(t := self._aligned(seen, s))]
+            found += [t for t in self._aligned(seen, starts()) if self._is_reached(t)]
             best = max(found, key=lambda t: self._value(t, predicted), default=None)
             if best is not None and best.evidence.score >= enough:
                 return self._slid(seen, best, predicted)
@@ -168,7 +168,7 @@ class Tracker:
         starts[:, 2] = tracked.pose[2]
         across = directions[:, 1] * (directions[:, 1] @ (tracked.pose - self.pose)[:2])
         starts[:, :2] += across + steps[:, None] * directions[:, 0]
-        found = [t for s in starts if self._is_reached(t := self._aligned(seen, s))]
+        found = [t for t in self._aligned(seen, starts) if self._is_reached(t)]
         return max([tracked, *found], key=lambda t: self._value(t, predicted))
 
     def _stands_out(self, best: Tracked, found: list[Tracked]) -> bool:
@@ -195,15 +195,22 @@ class Tracker:
             starts.append(fit.pose)
         return np.array(starts).reshape(-1, 3)
 
-    def _aligned(self, seen: Observation, start: FloatArray) -> Tracked:
+    def _aligned(self, seen: Observation, starts: FloatArray) -> list[Tracked]:
+        """Align from each of `starts` (k, 3), and judge where that ends."""
+        if len(starts) == 0:
+            return []
         p = self.parameters
         surface = seen.surface
         stride = 1 + (len(surface) - 1) // p.max_points
         prior = np.diag([p.motion_sigma**-2, p.motion_sigma**-2, p.turn_sigma**-2])
         thinned = surface.at(slice(None, None, stride))
-        fit = align(thinned, self._local.target, start, p.local_map.icp, prior)
-        evidence = self._local.evidence(seen.scan, surface, fit.pose)
-        return Tracked(fit.pose, evidence, fit.information)
+        fits = align_all(thinned, self._local.target, starts, p.local_map.icp, prior)
+        poses = np.array([fit.pose for fit in fits])
+        evidence = self._local.evidence(seen.scan, surface, poses)
+        return [
+            Tracked(fit.pose, judged, fit.information)
+            for fit, judged in zip(fits, evidence, strict=True)
+        ]
 
     def _value(self, tracked: Tracked, predicted: FloatArray) -> float:
         """Evidence less surprise: corridors leave a direction open, and speed is bounded.
