@@ -14,6 +14,7 @@ from mapweave.merging import MergingParameters, count_support, merge_scan
 from mapweave.polylines import group_polylines
 from mapweave.scan import Scan
 from mapweave.slivers import absorb_slivers
+from mapweave.vanished import VanishedParameters, Witness, last_sightings, still_there
 
 
 class SubmapParameters(BaseModel):
@@ -31,6 +32,7 @@ class SubmapParameters(BaseModel):
     free_space_turn: float = Field(0.26, gt=0, description="[rad] of rotation between them: 15°")
     merging: MergingParameters = MergingParameters()
     free_space: FreeSpaceParameters = FreeSpaceParameters()
+    vanished: VanishedParameters = VanishedParameters()
 
 
 @dataclass(slots=True)
@@ -50,7 +52,7 @@ class GrowingSubmap:
         self._weights: FloatArray = np.empty(0)
         self._sightings = _Sightings(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
         self._cleared: list[BaseGeometry] = []
-        self._cleared_from: FloatArray | None = None
+        self._witnesses: list[Witness] = []
         self._indices: list[int] = []
         self._stamps: list[float] = []
         self._poses: list[FloatArray] = []
@@ -97,11 +99,15 @@ class GrowingSubmap:
         return replace(self.lines(), free_space=outlines)
 
     def lines(self) -> LineMap:
-        """Return the lines alone."""
+        """Return the lines alone, without those that were seen through since they were seen."""
+        p = self._parameters
         whole = absorb_slivers(self._segments, self._weights)
-        order, polyline = group_polylines(whole.segments, self._parameters.max_gap)
-        support = count_support(whole.labels[self._sightings.labels], self._sightings.scans)
-        return LineMap(whole.segments[order], polyline, support[order])
+        labels, scans = whole.labels[self._sightings.labels], self._sightings.scans
+        support = count_support(labels, scans)
+        last = last_sightings(labels, scans)
+        left, support = still_there(whole.segments, support, last, self._witnesses, p.vanished)
+        order, polyline = group_polylines(whole.segments[left], p.max_gap)
+        return LineMap(whole.segments[left][order], polyline, support[order])
 
     def _merge(self, scan: int, segments: FloatArray) -> None:
         evolution = merge_scan(self._segments, self._weights, segments, self._parameters.merging)
@@ -116,9 +122,9 @@ class GrowingSubmap:
     def _clear(self, scan: Scan, pose: FloatArray) -> None:
         """Note what `scan` saw through, unless a scan from about here did already."""
         p = self._parameters
-        if self._cleared_from is not None:
-            x, y, turn = se2.between(self._cleared_from, pose)
+        if self._witnesses:
+            x, y, turn = se2.between(self._witnesses[-1].pose, pose)
             if np.hypot(x, y) < p.free_space_step and abs(turn) < p.free_space_turn:
                 return
         self._cleared.append(scan_free_space(scan, pose, p.free_space))
-        self._cleared_from = pose
+        self._witnesses.append(Witness(scan, pose))
