@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks [figure2 | map | kidnap | fusion | confidence | wire]``."""
+"""``python -m tests.benchmarks [figure2 | map | kidnap | fusion | peers | confidence | wire]``."""
 
 import argparse
 import io
@@ -6,7 +6,7 @@ import sys
 import time
 from typing import Protocol
 
-from tests.benchmarks import figure2, fit_confidence, fusion, kidnap, mapping, wire
+from tests.benchmarks import figure2, fit_confidence, fusion, kidnap, mapping, peers, wire
 
 
 class Benchmark(Protocol):
@@ -26,6 +26,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "map": mapping,
     "kidnap": kidnap,
     "fusion": fusion,
+    "peers": peers,
     "confidence": fit_confidence,
     "wire": wire,
 }

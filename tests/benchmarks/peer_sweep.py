@@ -1,0 +1,88 @@
+"""Peer: a sweep over rotations, each shift by correlation of the grids' walls through the FFT.
+
+The textbook way (Birk and Carpin 2006 search the same score by hill climbing): all turns in steps,
+all shifts at once, the best correlation wins; then once more around it, finer.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft, ndimage
+
+from mapweave import se2
+from mapweave.arrays import Float32Array, FloatArray
+from tests.benchmarks.peer_types import Guess, Peer, View
+from tests.benchmarks.peer_views import thin
+
+COARSE, FINE = 0.2, 0.1  # [m] cells
+COARSE_TURNS = np.radians(np.arange(0.0, 360.0, 2.0))
+FINE_TURNS = np.radians(np.arange(-2.0, 2.01, 0.5))
+BLUR = 1.0  # [cells] standard deviation
+THRESHOLD = 0.4  # of the correlation coefficient; ours, as no package comes with one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walls:
+    """(n, 2) middles of wall cells, coarse and fine [m]."""
+
+    coarse: FloatArray
+    fine: FloatArray
+
+
+def sweep_peer() -> Peer:
+    """Return the sweep."""
+    return Peer("FFT rotation sweep", THRESHOLD, _prepare, _match)
+
+
+def _prepare(view: View) -> Walls:
+    return Walls(thin(view.walls, COARSE), thin(view.walls, FINE))
+
+
+def _match(first: Walls, second: Walls) -> Guess | None:
+    coarse = correlate(first.coarse, second.coarse, COARSE_TURNS, COARSE)
+    return correlate(first.fine, second.fine, coarse.transform[2] + FINE_TURNS, FINE)
+
+
+def correlate(first: FloatArray, second: FloatArray, turns: FloatArray, cell: float) -> Guess:
+    """Return the best of all shifts by whole cells and the (k,) `turns` of `second` [rad].
+
+    Its score is the correlation coefficient of the two blurred grids, cosine of the angle between
+    them: 1 for equal ones.
+    """
+    reach = np.ptp(first, axis=0) + 2 * np.hypot(*second.T).max()
+    size = [fft.next_fast_len(int(r / cell) + 8, real=True) for r in reach[::-1]]
+    corner = first.min(axis=0)
+    blurred = _blur(_raster(first - corner, size, cell))
+    fixed = fft.rfft2(_blur(blurred))
+    best = Guess(np.zeros(3), -1.0)
+    for turn in turns:
+        turned = second @ se2.rotation(float(turn)).T
+        low = turned.min(axis=0)
+        moving = _raster(turned - low, size, cell)
+        overlap = fft.irfft2(fixed * fft.rfft2(moving).conj(), size)
+        row, column = np.unravel_index(int(overlap.argmax()), overlap.shape)
+        score = overlap[row, column]
+        if score > best.score:
+            shift = _signed(np.array([column, row]), size[::-1]) * cell + corner - low
+            best = Guess(np.array([*shift, turn]), float(score))
+    norm = np.linalg.norm(blurred) * np.linalg.norm(
+        _blur(_raster(second - second.min(0), size, cell))
+    )
+    return Guess(best.transform, best.score / float(norm))
+
+
+def _raster(points: FloatArray, size: list[int], cell: float) -> Float32Array:
+    raster = np.zeros(size, dtype=np.float32)
+    column, row = (points / cell + 0.5).astype(np.int64).T
+    raster[row, column] = 1.0
+    return raster
+
+
+def _blur(raster: Float32Array) -> Float32Array:
+    return np.asarray(ndimage.gaussian_filter(raster, BLUR, mode="wrap"), dtype=np.float32)
+
+
+def _signed(shift: np.ndarray, size: list[int]) -> np.ndarray:
+    """Return a cyclic shift as the smaller one of its two senses."""
+    half = np.array(size) // 2
+    return np.where(shift > half, shift - np.array(size), shift)
