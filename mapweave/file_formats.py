@@ -18,6 +18,7 @@ from pydantic import (
     model_validator,
 )
 
+from mapweave.arrays import FloatArray
 from mapweave.maps import (
     Alignment,
     Decision,
@@ -56,6 +57,8 @@ _Segment: TypeAlias = Annotated[
 _Polyline: TypeAlias = Annotated[list[_Segment], Field(min_length=1)]
 _Polygon: TypeAlias = Annotated[list[tuple[_Metre, _Metre]], Field(min_length=3)]
 _TrajectoryRow: TypeAlias = tuple[_Count, float | None, _Metre, _Metre, float]
+_Deviation: TypeAlias = Annotated[float, Field(ge=0, le=1e6)]
+_UncertaintyRow: TypeAlias = tuple[_Deviation, _Deviation, _Deviation, float]
 _Fact: TypeAlias = int | float | str | bool | list[float] | dict[str, float | None] | None
 _RobotId: TypeAlias = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 _ComponentName: TypeAlias = Annotated[
@@ -102,6 +105,16 @@ class SubmapFile(_LinesFile):
     pose: _Pose
     free_space: list[_Polygon]
     trajectory: list[_TrajectoryRow]
+    uncertainty: list[_UncertaintyRow] | None = None
+
+    @model_validator(mode="after")
+    def _uncertainty_fits(self) -> "SubmapFile":
+        if self.uncertainty is not None and len(self.uncertainty) != len(self.trajectory):
+            raise ValueError(
+                f"uncertainty has {len(self.uncertainty)} rows,"
+                f" expected {len(self.trajectory)} as in trajectory"
+            )
+        return self
 
     def to_submap(self) -> Submap:
         """Return it as the library's value."""
@@ -114,7 +127,13 @@ class SubmapFile(_LinesFile):
             scan_index=np.array([row[0] for row in rows], dtype=np.int64),
             stamp=np.array([_unknown_as_nan(row[1]) for row in rows], dtype=np.float64),
             pose=np.array([row[2:] for row in rows], dtype=np.float64).reshape(-1, 3),
+            uncertainty=self._uncertainty(),
         )
+
+    def _uncertainty(self) -> FloatArray | None:
+        if self.uncertainty is None:
+            return None
+        return np.array(self.uncertainty, dtype=np.float64).reshape(-1, 4)
 
 
 class MapFile(_Model):

@@ -217,12 +217,20 @@ def _submap(submap: Submap) -> dict[str, object]:
         "pose": _pose(submap.pose),
         **_line_map(submap.map),
         "trajectory": _trajectory(submap.trajectory),
+        **_uncertainty(submap.trajectory),
     }
 
 
 def _trajectory(trajectory: Trajectory) -> list[list[object]]:
     rows = zip(trajectory.scan_index, trajectory.stamp, trajectory.pose, strict=True)
     return [[int(index), _number(stamp, _SECONDS), *_pose(pose)] for index, stamp, pose in rows]
+
+
+def _uncertainty(trajectory: Trajectory) -> dict[str, object]:
+    """Return the rows beside those of the trajectory, where they are known."""
+    if trajectory.uncertainty is None:
+        return {}
+    return {"uncertainty": np.round(trajectory.uncertainty, _METRES).tolist()}
 
 
 def _line_map(lines: LineMap) -> dict[str, object]:

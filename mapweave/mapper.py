@@ -20,6 +20,7 @@ from mapweave.reunion import reunite
 from mapweave.scan import Scan
 from mapweave.submap import GrowingSubmap, SubmapParameters
 from mapweave.tracker import Tracked, Tracker, TrackerParameters
+from mapweave.uncertainty import UncertaintyParameters, pose_uncertainty, turn_uncertainty
 
 
 class MapperParameters(BaseModel):
@@ -29,6 +30,7 @@ class MapperParameters(BaseModel):
 
     observation: ObservationParameters = ObservationParameters()
     tracker: TrackerParameters = TrackerParameters()
+    uncertainty: UncertaintyParameters = UncertaintyParameters()
     submap: SubmapParameters = SubmapParameters()
     fusion: FusionParameters = FusionParameters()
     loops: LoopParameters = LoopParameters()
@@ -111,7 +113,7 @@ class Mapper:
         if tracked is None:
             self._tracker.forget_motion()
             return False
-        self._merge(seen, tracked.pose)
+        self._merge(seen, tracked)
         self._place_waiting()
         return True
 
@@ -132,7 +134,7 @@ class Mapper:
         for seen in reversed(self._waiting):
             tracked: Tracked | None = self._tracker.revisit(seen, pose)
             if tracked is not None:
-                self._merge(seen, tracked.pose)
+                self._merge(seen, tracked)
                 pose = tracked.pose
         self._waiting.clear()
 
@@ -149,14 +151,16 @@ class Mapper:
             if not self._place(seen):
                 self._waiting.append(seen)
 
-    def _merge(self, seen: Observation, pose: FloatArray) -> None:
-        """Merge a scan at `pose`, tracker's frame, into the growing submap."""
+    def _merge(self, seen: Observation, tracked: Tracked) -> None:
+        """Merge a scan where it was found, tracker's frame, into the growing submap."""
         if self._growing.is_full:
             self._finish_submap()
         if self._growing.is_empty:
-            self._frame = pose
-        local = se2.between(self._frame, pose)
-        self._growing.add(seen.scan, seen.lines.segments, local)
+            self._frame = tracked.pose
+        local = se2.between(self._frame, tracked.pose)
+        held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
+        held = turn_uncertainty(held, -self._frame[2])
+        self._growing.add(seen.scan, seen.lines.segments, local, held)
         self._version += 1
 
     def _finish_submap(self) -> None:

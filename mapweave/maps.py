@@ -27,11 +27,18 @@ class Trajectory:
         (m,) [s]; NaN where unknown.
     pose
         (m, 3) sensor poses [m, m, rad].
+    uncertainty
+        (m, 4) how well determined each was when it was placed, against what was mapped before:
+        standard deviations of the position in the direction that was held least [m], across it
+        [m], and of the heading [rad]; and that direction [rad], in (-pi/2, pi/2]. Zeros where a
+        pose was given and not found, as that of the first scan. None where it is not known, as in
+        maps from the network.
     """
 
     scan_index: IntArray
     stamp: FloatArray
     pose: FloatArray
+    uncertainty: FloatArray | None = None
 
     @classmethod
     def empty(cls) -> "Trajectory":

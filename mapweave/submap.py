@@ -14,6 +14,7 @@ from mapweave.merging import MergingParameters, count_support, merge_scan
 from mapweave.polylines import group_polylines
 from mapweave.scan import Scan
 from mapweave.slivers import absorb_slivers
+from mapweave.uncertainty import EXACT
 from mapweave.vanished import VanishedParameters, Witness, last_sightings, still_there
 
 
@@ -56,6 +57,7 @@ class GrowingSubmap:
         self._indices: list[int] = []
         self._stamps: list[float] = []
         self._poses: list[FloatArray] = []
+        self._uncertainties: list[FloatArray] = []
         self._path = 0.0
         self._turned = 0.0
 
@@ -72,8 +74,17 @@ class GrowingSubmap:
             self._path >= p.length or self._turned >= p.max_turn or len(self._poses) >= p.max_scans
         )
 
-    def add(self, scan: Scan, segments: FloatArray, pose: FloatArray) -> None:
-        """Merge `scan` with its (k, 4) `segments` [m], sensor frame, taken at `pose` (3,)."""
+    def add(
+        self,
+        scan: Scan,
+        segments: FloatArray,
+        pose: FloatArray,
+        uncertainty: FloatArray = EXACT,
+    ) -> None:
+        """Merge `scan` with its (k, 4) `segments` [m], sensor frame, taken at `pose` (3,).
+
+        The (4,) `uncertainty` of the pose, as of a `Trajectory`, is kept with it.
+        """
         if self._poses:
             step = se2.between(self._poses[-1], pose)
             self._path += float(np.hypot(step[0], step[1]))
@@ -81,6 +92,7 @@ class GrowingSubmap:
         self._indices.append(scan.index)
         self._stamps.append(scan.stamp)
         self._poses.append(pose)
+        self._uncertainties.append(uncertainty)
         self._merge(scan.index, se2.transform_segments(pose, segments))
         self._clear(scan, pose)
 
@@ -91,6 +103,7 @@ class GrowingSubmap:
             np.array(self._indices, dtype=np.int64)[order],
             np.array(self._stamps)[order],
             np.array(self._poses).reshape(-1, 3)[order],
+            np.array(self._uncertainties).reshape(-1, 4)[order],
         )
 
     def line_map(self) -> LineMap:

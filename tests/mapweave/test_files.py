@@ -106,7 +106,10 @@ def robot_maps(draw: st.DrawFn) -> RobotMap:
 def submaps(draw: st.DrawFn, submap: int) -> Submap:
     scans = draw(st.integers(0, 4))
     stamps = draw(arrays(np.float64, scans, elements=st.floats(0, 2e9) | st.just(np.nan)))
-    trajectory = Trajectory(draw(counts(scans)), stamps, draw(floats((scans, 3))))
+    deviations = arrays(np.float64, (scans, 4), elements=st.floats(0, 9))
+    trajectory = Trajectory(
+        draw(counts(scans)), stamps, draw(floats((scans, 3))), draw(st.none() | deviations)
+    )
     component = draw(st.integers(0, 3))
     return Submap(submap, component, draw(floats((3,))), draw(line_maps()), trajectory)
 
@@ -296,6 +299,8 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
         (MAP, ["submaps", 0, "free_space", 0], [[0, 0]], "submaps[0].free_space[0]", "at least 3"),
         (MAP, ["submaps", 0, "trajectory", 1, 0], 10**30, "submaps[0].trajectory[1][0]", "less"),
         (MAP, ["submaps", 0, "trajectory", 1, 1], float("inf"), "submaps[0].trajectory[1][1]", "f"),
+        (MAP, ["submaps", 0, "uncertainty"], [[0.1] * 4], "submaps[0]", "has 1 rows, expected 2"),
+        (MAP, ["submaps", 0, "uncertainty"], [[-1] * 4] * 2, "submaps[0].uncertainty[0]", "equal"),
         (MAP, ["submaps"], MAP["submaps"] * 2, "", "ids of submaps should ascend"),
         (JOINT, ["alignments", 0, "decision"], "maybe", "alignments[0].decision", "'refused'"),
         (JOINT, ["alignments", 0, "confidence"], 1.5, "alignments[0].confidence", "equal to 1"),
