@@ -1,7 +1,8 @@
 """Which alignments to rely on, and the poses that follow.
 
 Accepted alignments are links between components. The most probable explanation of them all says
-which are right; the others are set aside and named. The poses are fitted to those that are right.
+which are right, given what the maps say of how they come to lie; the others are set aside and
+named. The poses are fitted to those that are right.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,10 +15,14 @@ from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.cuts import groups
 from mapweave.cycles import Edge, misfit, poses_along
-from mapweave.explanations import Explanation, ExplanationParameters, explain
+from mapweave.doubts import DoubtParameters, MapDoubts, MapWitnesses, Witness
+from mapweave.explanations import ExplanationParameters, bits, explain
+from mapweave.map_raster import MapRaster
 from mapweave.maps import Alignment
 from mapweave.pose_graph import Link, optimise
 from mapweave.reliance import component_confidence, rely
+
+REASON_LENGTH = 400  # characters: a message carries 500, and who passes it on may add to it
 
 
 class GraphParameters(BaseModel):
@@ -26,6 +31,7 @@ class GraphParameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     explanations: ExplanationParameters = ExplanationParameters()
+    doubts: DoubtParameters = DoubtParameters()
     sigma: float = Field(0.1, gt=0, description="[m] of an alignment's translation")
     turn_sigma: float = Field(0.01, gt=0, description="[rad] of an alignment's rotation")
 
@@ -50,7 +56,7 @@ def cluster_components(
     names: Sequence[str],
     alignments: Sequence[Alignment],
     parameters: GraphParameters,
-    middles: Mapping[str, FloatArray] | None = None,
+    rasters: Mapping[str, MapRaster] | None = None,
 ) -> tuple[list[Cluster], tuple[Alignment, ...]]:
     """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
 
@@ -58,13 +64,14 @@ def cluster_components(
 
     Parameters
     ----------
-    middles
-        For each component the (2,) middle of its wall [m]. What alignments differ by is measured
-        there, because it depends on no frame; where none is given, at the component's origin.
+    rasters
+        The maps of those components that have seen any wall, each in its frame: they object to
+        alignments that contradict them. What alignments differ by is measured at the maps'
+        middles, because that depends on no frame; without a map, at the component's origin.
     """
     known = set(names)
     alignments = [a for a in alignments if a.reference in known and a.other in known]
-    graph = _Graph(names, alignments, parameters, middles or {})
+    graph = _Graph(names, alignments, parameters, rasters or {})
     judged = tuple(graph.judge(alignment) for alignment in alignments)
     return sorted(graph.clusters(), key=lambda c: -len(c.poses)), judged
 
@@ -77,18 +84,21 @@ class _Graph:
         names: Sequence[str],
         alignments: Sequence[Alignment],
         parameters: GraphParameters,
-        middles: Mapping[str, FloatArray],
+        rasters: Mapping[str, MapRaster],
     ) -> None:
         self._names, self._parameters = names, parameters
         self._number = {name: number for number, name in enumerate(names)}
-        self._middles = np.array([[*middles.get(name, (0.0, 0.0)), 0.0] for name in names])
+        self._middles = np.array([_middle(rasters.get(name)) for name in names])
         links = [a for a in alignments if a.decision == "accepted" and a.reference != a.other]
         # In an order of their own, so that the order in which they came changes nothing.
         links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
         self._edge_of = {id(link): k for k, link in enumerate(links)}
         self._edges = [self._edge(link) for link in links]
+        seen = {self._number[name]: raster for name, raster in rasters.items()}
+        witnesses = MapWitnesses(seen, self._middles, parameters.doubts)
+        self._doubts = MapDoubts(len(names), self._edges, witnesses)
         p = parameters.explanations
-        self._explanations: list[Explanation] = explain(len(names), self._edges, p)
+        self._explanations = explain(len(names), self._edges, p, self._doubts)
         self._right = rely(len(names), self._edges, self._explanations)
 
     def _edge(self, link: Alignment) -> Edge:
@@ -112,21 +122,38 @@ class _Graph:
         edge = self._edge_of.get(id(alignment))
         if edge is None or edge in self._right:
             return alignment
-        reason = f"set aside: {self._contradiction(edge)}; {alignment.reason}"
-        return replace(alignment, decision="ambiguous", reason=reason)
+        reason = f"set aside: {self._objection(edge)}; {alignment.reason}"
+        return replace(alignment, decision="ambiguous", reason=_shortened(reason))
 
-    def _contradiction(self, k: int) -> str:
-        """What alignment `k` contradicts, in words."""
+    def _objection(self, k: int) -> str:
+        """What speaks against edge `k`, in words."""
         edge = self._edges[k]
         present = sorted(self._right)
         poses, paths = poses_along(edge.first, len(self._names), self._edges, present)
-        path = paths[edge.second]
-        if path < 0:
-            return "contradicts others, and nothing tells for sure which is wrong"
-        off = misfit(edge.transform, poses[edge.first], poses[edge.second])
-        distance, turn = float(np.hypot(off[0], off[1])), float(np.degrees(abs(off[2])))
-        others = sorted(self._tell(other) for other in present if path >> other & 1)
-        return f"{distance:.1f} m and {turn:.0f}° off what {_enumerate(others)} say"
+        if paths[edge.second] >= 0:
+            off = misfit(edge.transform, poses[edge.first], poses[edge.second])
+            others = sorted(self._tell(other) for other in bits(paths[edge.second]))
+            return (
+                f"{np.hypot(off[0], off[1]):.1f} m and {np.degrees(abs(off[2])):.0f}° off what"
+                f" {_enumerate(others)} {'say' if len(others) > 1 else 'says'}"
+            )
+        before = {(w.first, w.second) for w in self._doubts.against(present)}
+        news = [
+            witness
+            for witness in self._doubts.against(sorted([*present, k]))
+            if (witness.first, witness.second) not in before
+        ]
+        if news:
+            return self._tell_witness(max(news, key=lambda witness: witness.doubt))
+        return "contradicts others, and nothing tells for sure which is wrong"
+
+    def _tell_witness(self, witness: Witness) -> str:
+        first, second = self._names[witness.first], self._names[witness.second]
+        verdict = witness.verdict
+        return (
+            f"{first} and {second} would have {verdict.contradicted:.0f} m of wall where the other"
+            f" saw free space, {verdict.common:.0f} m in common"
+        )
 
     def _tell(self, k: int) -> str:
         edge = self._edges[k]
@@ -139,8 +166,7 @@ class _Graph:
         fitted = poses[list(group)]
         if len(inside) >= len(group):  # a tree fits as it stands
             fitted = self._fitted(group, inside, fitted)
-        middles = self._middles[list(group)]
-        frames = se2.compose(fitted, se2.inverse(middles))
+        frames = se2.compose(fitted, se2.inverse(self._middles[list(group)]))
         frames = se2.between(frames[0], frames)
         frames[0] = 0.0
         return {self._names[node]: pose for node, pose in zip(group, frames, strict=True)}
@@ -163,6 +189,16 @@ class _Graph:
         for k in inside:
             rest = [other for other in inside if other != k]
             yield self._edges[k], len(groups(count, self._edges, rest)) > parts
+
+
+def _middle(raster: MapRaster | None) -> FloatArray:
+    """(3,) frame at the middle of a map's wall; the map's own where it has seen none."""
+    x, y = raster.surface.points.mean(axis=0) if raster else (0.0, 0.0)
+    return np.array([x, y, 0.0])
+
+
+def _shortened(reason: str) -> str:
+    return reason if len(reason) <= REASON_LENGTH else f"{reason[: REASON_LENGTH - 1]}…"
 
 
 def _enumerate(items: Sequence[str]) -> str:

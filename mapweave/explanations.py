@@ -10,12 +10,15 @@ probability follows from three assumptions:
 So the log of an explanation's weight is the sum of the log odds of those that are right, and
 -log(chance) for every independent cycle that they close: |right| - |nodes| + |parts|. Majority
 and confidence are in it both, and no alignment, however sure, outweighs a cycle that agrees.
+What else speaks against an explanation, such as walls where others saw through, is doubt that
+costs as much.
 """
 
 import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -72,8 +75,27 @@ class Explanation:
     weight: float
 
 
+class Doubts(Protocol):
+    """What speaks against poses, beside the alignments themselves."""
+
+    def __call__(self, removed: int, /) -> tuple[float, int]:
+        """Return what speaks against the edges that agree once `removed` are not there.
+
+        Returns
+        -------
+        doubt
+            The log of the odds against them, 0 or more.
+        edges
+            Bit mask of the edges of which one at least would have to go; 0 where there is no doubt.
+        """
+        ...
+
+
 def explain(
-    count: int, edges: Sequence[Edge], parameters: ExplanationParameters
+    count: int,
+    edges: Sequence[Edge],
+    parameters: ExplanationParameters,
+    doubts: Doubts | None = None,
 ) -> list[Explanation]:
     """Return the explanations of `edges` between `count` nodes, the most probable first.
 
@@ -81,48 +103,77 @@ def explain(
     the least costly, so the first that leaves only cycles that close is the most probable. Where
     that takes too long, what is in most of such cycles goes first.
     """
-    found = _Search(count, edges, parameters).run()
-    least = found[0][0]
+    found = _Search(count, edges, parameters, doubts or _no_doubt).run()
+    least = found[0].cost
     return [
         Explanation(
-            frozenset(k for k in range(len(edges)) if not removed >> k & 1),
-            math.exp(least - cost),
+            frozenset(k for k in range(len(edges)) if not one.removed >> k & 1),
+            math.exp(least - one.cost),
         )
-        for cost, removed in found
+        for one in found
     ]
 
 
-class _Search:
-    """Sets of removed edges as bit masks, in the order of what removing them costs."""
+class _Candidate(NamedTuple):
+    """A set of removed edges: what it costs, and the part of that which is doubt, once known."""
 
-    def __init__(self, count: int, edges: Sequence[Edge], p: ExplanationParameters) -> None:
-        self._count, self._edges, self._p = count, edges, p
+    cost: float
+    removed: int
+    doubt: float | None = None
+
+
+class _Search:
+    """Sets of removed edges as bit masks, in the order of what they cost."""
+
+    def __init__(
+        self, count: int, edges: Sequence[Edge], p: ExplanationParameters, doubts: Doubts
+    ) -> None:
+        self._count, self._edges, self._p, self._doubts = count, edges, p, doubts
         self._odds = [p.log_odds(edge.confidence) for edge in edges]
         self._cycles = bad_cycles(count, edges, 0, p.cycles)
         self._whole = self._independent_cycles(0)
+        self._waiting = [_Candidate(0.0, 0)]
+        self._seen = {0}
+        self._found: list[_Candidate] = []
 
-    def run(self) -> list[tuple[float, int]]:
-        """Return (cost, removed) of each explanation."""
-        p = self._p
-        found: list[tuple[float, int]] = []
-        waiting, seen = [(0.0, 0)], {0}
+    def run(self) -> list[_Candidate]:
+        """Return the explanations."""
+        p, found = self._p, self._found
         for _ in range(p.max_tries):
-            if not waiting or len(found) == p.max_count:
+            if not self._waiting or len(found) == p.max_count:
                 break
-            cost, removed = heapq.heappop(waiting)
-            if found and cost > found[0][0] + math.log(p.max_odds):
+            candidate = heapq.heappop(self._waiting)
+            if found and candidate.cost > found[0].cost + math.log(p.max_odds):
                 break
-            if any(removed & less == less for _, less in found):
-                continue  # an explanation already, less one that could as well be right
-            cycle = self._bad_cycle(removed)
-            if not cycle:
-                found.append((cost, removed))
-            for k in _bits(cycle):
-                more = removed | 1 << k
-                if more not in seen:
-                    seen.add(more)
-                    heapq.heappush(waiting, (self._cost(more), more))
-        return found or [self._remove_greedily(waiting[0][1])]
+            if not self._is_less_than_found(candidate):
+                self._look_at(candidate)
+        return found or [self._remove_greedily(self._waiting[0].removed)]
+
+    def _is_less_than_found(self, candidate: _Candidate) -> bool:
+        """Whether an explanation relies on more edges, and no more speaks against it."""
+        return any(
+            candidate.removed & found.removed == found.removed
+            and (found.doubt or 0.0) <= (candidate.doubt or 0.0)
+            for found in self._found
+        )
+
+    def _look_at(self, candidate: _Candidate) -> None:
+        """Take `candidate` as an explanation, or see what else would have to go."""
+        if candidate.doubt is not None:
+            self._found.append(candidate)
+            return
+        conflict = self._bad_cycle(candidate.removed)
+        if not conflict:
+            doubt, conflict = self._doubts(candidate.removed)
+            believed = _Candidate(candidate.cost + doubt, candidate.removed, doubt)
+            heapq.heappush(self._waiting, believed)
+        for k in bits(conflict):
+            self._consider(candidate.removed | 1 << k)
+
+    def _consider(self, removed: int) -> None:
+        if removed not in self._seen:
+            self._seen.add(removed)
+            heapq.heappush(self._waiting, _Candidate(self._cost(removed), removed))
 
     def _bad_cycle(self, removed: int) -> int:
         """Return a cycle that is left and does not close, 0 if there is none."""
@@ -134,7 +185,7 @@ class _Search:
         return news[0] if news else 0
 
     def _cost(self, removed: int) -> float:
-        odds = sum(self._odds[k] for k in _bits(removed))
+        odds = sum(self._odds[k] for k in bits(removed))
         lost = self._whole - self._independent_cycles(removed)
         return odds + lost * self._p.cycle_gain
 
@@ -156,14 +207,19 @@ class _Search:
                 group[a] = b
         return closing
 
-    def _remove_greedily(self, removed: int) -> tuple[float, int]:
+    def _remove_greedily(self, removed: int) -> _Candidate:
         while self._bad_cycle(removed):
             left = [cycle for cycle in self._cycles if not cycle & removed]
             counts = [sum(cycle >> k & 1 for cycle in left) for k in range(len(self._edges))]
             worst = max(range(len(counts)), key=lambda k: (counts[k], -self._odds[k]))
             removed |= 1 << worst
-        return self._cost(removed), removed
+        return _Candidate(self._cost(removed), removed)
 
 
-def _bits(mask: int) -> list[int]:
+def bits(mask: int) -> list[int]:
+    """Return which bits of `mask` are set."""
     return [k for k in range(mask.bit_length()) if mask >> k & 1]
+
+
+def _no_doubt(_: int) -> tuple[float, int]:
+    return 0.0, 0

@@ -8,12 +8,13 @@ from mapweave.cycles import Edge
 from mapweave.explanations import Explanation, ExplanationParameters
 
 CERTAIN = 1e-6  # least doubt in an alignment that is counted
+MAX_UNDECIDED = 0.5 + 1e-6  # an even chance, rounding included, decides nothing
 
 
 def rely(count: int, edges: Sequence[Edge], explanations: Sequence[Explanation]) -> frozenset[int]:
     """Return the edges of the most probable explanation, less those that nothing decides about.
 
-    A group of nodes that holds together rightly in less than half of what may be loses the edge
+    A group of nodes that holds together rightly in half of what may be, or less, loses the edge
     that is right in the least part of it, until what is left is more probably right than wrong.
     """
     right = set(explanations[0].right)
@@ -21,7 +22,7 @@ def rely(count: int, edges: Sequence[Edge], explanations: Sequence[Explanation])
         doubtful = [
             group
             for group in groups(count, edges, right)
-            if _share(group, count, edges, right, explanations) < 0.5
+            if _share(group, count, edges, right, explanations) <= MAX_UNDECIDED
         ]
         if not doubtful:
             return frozenset(right)

@@ -1,6 +1,6 @@
 """Alignments that agree carry the poses; one that contradicts surer ones is set aside and named."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -11,8 +11,10 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.alignment_graph import Cluster, GraphParameters, cluster_components
 from mapweave.arrays import FloatArray
-from mapweave.maps import Alignment, Decision
-from tests.mapweave.buildings import random_pose
+from mapweave.assembly import place
+from mapweave.map_raster import MapRaster, RasterParameters
+from mapweave.maps import Alignment, Decision, LineMap
+from tests.mapweave.buildings import BUILDING, part, random_pose
 
 P = GraphParameters()
 NAMES = ["a/0", "b/0", "c/0", "d/0"]
@@ -166,14 +168,19 @@ def test_one_wrong_alignment_the_surest_of_all_is_set_aside_and_named(seed: int)
     assert cluster.confidence <= without.confidence
 
 
-@pytest.mark.parametrize("seed", range(8))
+def rasters_of(maps: Mapping[str, LineMap]) -> dict[str, MapRaster]:
+    return {name: MapRaster.of(lines, RasterParameters()) for name, lines in maps.items()}
+
+
+@pytest.mark.parametrize("seed", range(4))
 def test_other_frames_change_nothing(seed: int) -> None:
     """Each component in a frame of its own choice: the same decisions, the same shape."""
     rng = np.random.default_rng(seed)
     team = random_team(rng)
     links = [team.wrong, *team.links]
     frames = {name: random_pose(rng) for name in team.names}
-    middles = {name: rng.uniform(-5, 5, 2) for name in team.names}
+    maps = {name: place(part(BUILDING, 0, 9), random_pose(rng, 3)) for name in team.names}
+    maps = {name: replace(lines, free_space=()) for name, lines in maps.items()}
     moved = [
         replace(
             a,
@@ -183,9 +190,9 @@ def test_other_frames_change_nothing(seed: int) -> None:
         )
         for a in links
     ]
-    middles_moved = {n: se2.transform_points(frames[n], middles[n]) for n in team.names}
-    (here,), judged = cluster_components(team.names, links, P, middles)
-    (there,), judged_there = cluster_components(team.names, moved, P, middles_moved)
+    maps_moved = {name: place(maps[name], frames[name]) for name in team.names}
+    (here,), judged = cluster_components(team.names, links, P, rasters_of(maps))
+    (there,), judged_there = cluster_components(team.names, moved, P, rasters_of(maps_moved))
     assert [a.reason for a in judged] == [a.reason for a in judged_there]
     assert there.confidence == pytest.approx(here.confidence)
     first = team.names[0]
@@ -193,7 +200,7 @@ def test_other_frames_change_nothing(seed: int) -> None:
         expected = se2.compose(
             frames[first], se2.compose(here.poses[name], se2.inverse(frames[name]))
         )
-        np.testing.assert_allclose(there.poses[name], expected, atol=1e-5)
+        np.testing.assert_allclose(there.poses[name], expected, atol=2e-3)  # [m], as fitted
 
 
 def test_one_more_robot_joins_two_clusters() -> None:

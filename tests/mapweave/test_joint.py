@@ -124,7 +124,8 @@ def test_a_wall_is_less_sure_once_another_robot_saw_through_it() -> None:
     denied = confidence_of_partition(line_map(walls_of(ROOM), FREE))
     assert alone == pytest.approx(5 / 6)  # n sightings: n / (n + 1)
     assert confirmed == pytest.approx(10 / 11)
-    assert denied < 0.1
+    assert denied == pytest.approx(5 / 12, abs=0.05)  # one robot for it, one against
+    assert confidence_of_partition(*[line_map(walls_of(ROOM), FREE)] * 4) < 0.2
 
 
 def test_segment_confidence_is_a_probability_that_grows_with_sightings() -> None:
