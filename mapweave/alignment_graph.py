@@ -22,7 +22,8 @@ from mapweave.maps import Alignment
 from mapweave.pose_graph import Link, optimise
 from mapweave.reliance import component_confidence, rely
 
-REASON_LENGTH = 400  # characters: a message carries 500, and who passes it on may add to it
+SET_ASIDE = "set aside: "  # begins the reason of an accepted alignment that is not relied on
+REASON_LENGTH = 500  # characters, as many as a message carries
 
 
 class GraphParameters(BaseModel):
@@ -50,6 +51,11 @@ class Cluster:
 
     poses: Mapping[str, FloatArray]
     confidence: float
+
+
+def shortened(reason: str) -> str:
+    """Return `reason`, cut off where it is too long."""
+    return reason if len(reason) <= REASON_LENGTH else f"{reason[: REASON_LENGTH - 1]}…"
 
 
 def cluster_components(
@@ -122,8 +128,8 @@ class _Graph:
         edge = self._edge_of.get(id(alignment))
         if edge is None or edge in self._right:
             return alignment
-        reason = f"set aside: {self._objection(edge)}; {alignment.reason}"
-        return replace(alignment, decision="ambiguous", reason=_shortened(reason))
+        reason = f"{SET_ASIDE}{self._objection(edge)}; {alignment.reason}"
+        return replace(alignment, decision="ambiguous", reason=shortened(reason))
 
     def _objection(self, k: int) -> str:
         """What speaks against edge `k`, in words."""
@@ -195,10 +201,6 @@ def _middle(raster: MapRaster | None) -> FloatArray:
     """(3,) frame at the middle of a map's wall; the map's own where it has seen none."""
     x, y = raster.surface.points.mean(axis=0) if raster else (0.0, 0.0)
     return np.array([x, y, 0.0])
-
-
-def _shortened(reason: str) -> str:
-    return reason if len(reason) <= REASON_LENGTH else f"{reason[: REASON_LENGTH - 1]}…"
 
 
 def _enumerate(items: Sequence[str]) -> str:

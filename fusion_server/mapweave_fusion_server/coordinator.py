@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.assembly import assemble
 from mapweave.joint import build_joint_map
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name
+from mapweave.revocation import mark_revoked
 from mapweave_protocol.messages import AlignmentMessage, MapVersion
 
 Run: TypeAlias = tuple[str, str]  # robot and boot
@@ -42,20 +43,32 @@ class Urgency(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """All that goes into a version; building it takes seconds and changes nothing here."""
+    """All that goes into a version; building it takes seconds and changes nothing here.
+
+    Attributes
+    ----------
+    version
+        Its number.
+    maps, alignments
+        All that are known.
+    before
+        The alignments of the last version, as it judged them.
+    """
 
     version: int
     maps: tuple[RobotMap, ...]
     alignments: tuple[Alignment, ...]
+    before: tuple[Alignment, ...] = ()
 
     def build(self) -> JointMap:
-        """Return the joint map."""
+        """Return the joint map; what it revokes of the last version, it names."""
         components = {
             component_name(robot_map.robot, component): assemble(robot_map, component)
             for robot_map in self.maps
             for component in robot_map.components
         }
-        return build_joint_map(components, self.alignments, self.version)
+        joint = build_joint_map(components, self.alignments, self.version)
+        return mark_revoked(joint, self.before)
 
 
 class Coordinator:
@@ -65,13 +78,14 @@ class Coordinator:
     ----------
     parameters
         See there.
-    last_version
-        Where the numbering stands; 0 before the first version.
+    last
+        The last version, from which numbering and judging go on; None before the first one.
     """
 
-    def __init__(self, parameters: CoordinatorParameters, last_version: int = 0) -> None:
+    def __init__(self, parameters: CoordinatorParameters, last: JointMap | None = None) -> None:
         self._parameters = parameters
-        self._version = last_version
+        self._version = last.version if last else 0
+        self._judged = last.alignments if last else ()
         self._names: set[str] = set()
         self._maps: dict[str, RobotMap] = {}
         self._alignments: dict[frozenset[str], AlignmentMessage] = {}
@@ -88,10 +102,6 @@ class Coordinator:
     def map_of(self, robot: str) -> RobotMap | None:
         """Return a robot's last map, None when there is none."""
         return self._maps.get(robot)
-
-    def alignments_of(self, pair: frozenset[str]) -> AlignmentMessage | None:
-        """Return what was last found for a pair of robots, None when nothing was."""
-        return self._alignments.get(pair)
 
     def admits(self, robots: Set[str]) -> bool:
         """Return whether these robots are listened to; from the first time they are."""
@@ -154,14 +164,15 @@ class Coordinator:
         if self._draft is not None:
             raise RuntimeError("the last draft is not finished")
         maps = tuple(self._maps[robot] for robot in sorted(self._maps))
-        self._draft = Draft(self._version + 1, maps, tuple(self._alignments_in_force()))
+        alignments = tuple(self._alignments_in_force())
+        self._draft = Draft(self._version + 1, maps, alignments, self._judged)
         self._begun, self._urgency = now, Urgency.NONE
         return self._draft
 
-    def finish(self, *, built: bool) -> None:
-        """End the draft; a version that could not be built leaves its number to the next."""
-        if self._draft is not None and built:
-            self._version = self._draft.version
+    def finish(self, joint: JointMap | None) -> None:
+        """End the draft that became `joint`; None, when it could not be built, keeps its number."""
+        if joint is not None:
+            self._version, self._judged = joint.version, joint.alignments
         self._draft = None
 
     def _alignments_in_force(self) -> Iterator[Alignment]:

@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Set
 
 from mapweave.errors import FileError, InvalidIdError
-from mapweave.maps import RobotMap
+from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, pair_of
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
@@ -18,10 +18,25 @@ from mapweave_protocol.codec import decode
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.inbox import Arrival, alignment_reader, map_reader
 from mapweave_protocol.keys import LIVE
-from mapweave_protocol.messages import AlignmentMessage, MapMessage
+from mapweave_protocol.messages import AlignmentMessage, JointMapMessage, MapMessage
 from mapweave_protocol.story import Story
 
 _log = logging.getLogger(__name__)
+
+
+def last_version(store: Store) -> JointMap | None:
+    """Return the last version that `store` remembers, None when there is none.
+
+    Raises
+    ------
+    FileError
+        If it is unreadable.
+    """
+    payload = store.version(store.latest_version)
+    try:
+        return decode(JointMapMessage, payload).unpack() if payload is not None else None
+    except MessageError as error:
+        raise FileError(store.path, f"the store is damaged: {error}") from error
 
 
 class Intake:

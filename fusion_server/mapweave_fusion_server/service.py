@@ -12,8 +12,8 @@ from mapweave.errors import MapweaveError
 from mapweave_fusion_server.answers import answer
 from mapweave_fusion_server.builder import Builder
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
-from mapweave_fusion_server.intake import Intake
-from mapweave_fusion_server.journal import record, tell_set_aside
+from mapweave_fusion_server.intake import Intake, last_version
+from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
 from mapweave_protocol import keys, session
 from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
@@ -57,8 +57,8 @@ class Service:
         self._session = zenoh_session
         self._team = team
         self._store = store
-        self._coordinator = Coordinator(parameters, store.latest_version)
         self._story = Story()
+        self._coordinator = Coordinator(parameters, last_version(store))
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
@@ -114,8 +114,7 @@ class Service:
             self._store.add_version(built.draft.version, built.begun, built.payload)
             self._publisher.put(built.payload)
             record(self._story.joined(built.joint))
-            record(tell_set_aside(built.draft.alignments, built.joint))
-        self._coordinator.finish(built=built is not None)
+        self._coordinator.finish(built.joint if built else None)
 
     def _publish_again(self) -> None:
         """Publish the latest version of the store: the cache died with the last publisher."""

@@ -122,14 +122,6 @@ class Store:
             received, *sorted(pair), message,
         )  # fmt: skip
 
-    def alignment_history(self, pair: tuple[str, str]) -> list[tuple[float, bytes]]:
-        """Return when [s since 1970] and what was found for a pair of robots, oldest first."""
-        rows = self._rows(
-            "SELECT received, message FROM alignment WHERE first = ? AND second = ? ORDER BY id",
-            *sorted(pair),
-        )
-        return [(float(received), bytes(message)) for received, message in rows]
-
     def last_alignments(self) -> list[bytes]:
         """Return the last message of every pair of robots."""
         return self._blobs(

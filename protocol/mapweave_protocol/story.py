@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mapweave.confidence import percent
-from mapweave.maps import JointComponent, JointMap, RobotMap
+from mapweave.maps import Alignment, JointComponent, JointMap, RobotMap
+from mapweave.revocation import objection
 from mapweave_protocol.messages import AlignmentMessage, StatusMessage
 
 
@@ -39,6 +40,7 @@ class Story:
         self.robots: dict[str, RobotState] = {}
         self.joint: JointMap | None = None
         self._decisions: dict[tuple[str, str], str] = {}
+        self._objections: dict[tuple[str, str], int | None] = {}
 
     def appeared(self, robot: str, boot: str) -> Iterator[str]:
         """Tell that a run of a robot began."""
@@ -87,10 +89,23 @@ class Story:
                 )
 
     def joined(self, joint: JointMap) -> Iterator[str]:
-        """Tell a version of the joint map."""
+        """Tell a version of the joint map, and each join that it is the first not to rely on."""
         self.joint = joint
         groups = [_tell_component(component) for component in joint.components]
         yield f"joint map {joint.version}: {', '.join(groups) or 'nothing yet'}"
+        for alignment in joint.alignments:
+            yield from self._objected(alignment)
+
+    def _objected(self, alignment: Alignment) -> Iterator[str]:
+        pair = alignment.reference, alignment.other
+        found = objection(alignment)
+        if found is None:
+            self._objections.pop(pair, None)
+        elif self._objections.get(pair, -1) != found.revoked:
+            self._objections[pair] = found.revoked
+            undone = f"joined no longer, since version {found.revoked}"
+            what = undone if found.revoked else "not relied on"
+            yield f"{pair[0]} and {pair[1]}: {what} ({found.reason})"
 
     def _robot(self, robot: str) -> RobotState:
         return self.robots.setdefault(robot, RobotState())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from mapweave.maps import RobotMap
+from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters, Draft
 from mapweave_protocol.codec import encode
 from mapweave_protocol.messages import JointMapMessage
@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
 
 def _coordinator(last_version: int = 0, **parameters: float) -> Coordinator:
-    return Coordinator(CoordinatorParameters.model_validate(parameters), last_version)
+    last = JointMap(last_version, (), ()) if last_version else None
+    return Coordinator(CoordinatorParameters.model_validate(parameters), last)
 
 
 def _make_version(coordinator: Coordinator, now: float = 0.0) -> Draft:
     draft = coordinator.begin(now)
-    coordinator.finish(built=True)
+    coordinator.finish(JointMap(draft.version, (), draft.alignments))
     return draft
 
 
@@ -113,11 +114,11 @@ def test_a_moved_transform_waits_for_the_interval(
 def test_what_arrives_while_building_goes_into_one_next_version(make_map: MakeMap) -> None:
     coordinator = _coordinator(min_interval=0.0)
     coordinator.receive_map(make_map("a"))
-    coordinator.begin(0.0)
+    first = coordinator.begin(0.0)
     for robot in "bcd":
         coordinator.receive_map(make_map(robot))
         assert coordinator.seconds_until_due(100.0) == math.inf
-    coordinator.finish(built=True)
+    coordinator.finish(JointMap(first.version, (), ()))
     draft = _make_version(coordinator, now=100.0)
     assert draft.version == 2
     assert [robot_map.robot for robot_map in draft.maps] == ["a", "b", "c", "d"]
@@ -130,7 +131,7 @@ def test_a_version_that_could_not_be_built_leaves_its_number_to_the_next(
     coordinator = _coordinator()
     coordinator.receive_map(make_map("a"))
     assert coordinator.begin(0.0).version == 1
-    coordinator.finish(built=False)
+    coordinator.finish(None)
     assert not coordinator.has_news
     coordinator.receive_map(make_map("b"))
     assert coordinator.begin(0.0).version == 1

@@ -49,7 +49,7 @@ def test_who_listened_before_sees_joining_and_parting_as_versions_1_2_3_4(
     assert [joint.version for joint in seen] == [1, 2, 3, 4]
     apart, together = [["a/0"], ["b/0"]], [["a/0", "b/0"]]
     assert [network.groups(joint) for joint in seen] == [[["a/0"]], apart, together, apart]
-    assert [a.reason for a in seen[3].alignments] == ["walls in the way"]
+    assert [a.reason for a in seen[3].alignments] == ["revoked in version 4: walls in the way"]
 
 
 @pytest.mark.usefixtures("finished_team")

@@ -42,7 +42,6 @@ def test_everything_is_still_there_after_a_restart(path: Path) -> None:
         assert list(store.versions_since(1)) == [b"version 2", b"version 3"]
         assert store.map_of("a") == b"map"
         assert store.last_maps() == [b"map"]
-        assert store.alignment_history(("a", "b")) == [(5.5, b"refused"), (6.5, b"accepted")]
         assert store.last_alignments() == [b"accepted"]
 
 

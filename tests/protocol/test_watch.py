@@ -102,6 +102,27 @@ def test_a_version_of_the_joint_map_is_told_once_with_its_components(
     assert lines[0].startswith("joint map 4: a/0 + b/0 (")
 
 
+def test_a_join_that_a_version_does_not_rely_on_is_told_once_with_the_reason() -> None:
+    story = Story()
+    aside, revoked = "set aside: 9 m off what a/0-c/0 says", "revoked in version 3: only 2 m"
+    lines = [
+        line
+        for version, reason in enumerate([aside, aside, revoked, revoked], start=1)
+        for line in story.joined(
+            JointMap(
+                version,
+                (),
+                (Alignment("a/0", "b/0", np.zeros(3), "ambiguous", 0.9, reason),),
+            )
+        )
+        if not line.startswith("joint map")
+    ]
+    assert lines == [
+        "a/0 and b/0: not relied on (9 m off what a/0-c/0 says)",
+        "a/0 and b/0: joined no longer, since version 3 (only 2 m)",
+    ]
+
+
 def test_what_is_no_message_is_not_told() -> None:
     watcher = Watcher()
     for key in (keys.MAP.build(team="t", robot="a"), "mapweave/@v1/t/@live/NO ID/1", "elsewhere"):
