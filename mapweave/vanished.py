@@ -32,7 +32,9 @@ class VanishedParameters(BaseModel):
         description="[rad] at which a beam must meet the segment at least: 15°; along a wall, an"
         " error of centimetres across it lets beams through",
     )
-    share: float = Field(0.6, gt=0, le=1, description="of its points that must be seen through")
+    share: float = Field(
+        0.8, gt=0, le=1, description="of its points that must be seen through: all but its ends"
+    )
     places: int = Field(
         3, ge=1, description="seen through from so many after the last sighting, it has vanished"
     )
