@@ -14,6 +14,7 @@ from mapweave.joint import build_joint_map
 from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave.picture import draw_joint, draw_map
 from mapweave.scan import Scan
+from tests.benchmarks.calibration import within_two_sigma
 from tests.benchmarks.coverage import explained_share, returns_at
 from tests.benchmarks.logs import Log, find_logs, load_scans, load_truth
 from tests.benchmarks.runs import Run, map_scans
@@ -21,6 +22,7 @@ from tests.benchmarks.tables import OUTPUT, format_table, write_json
 from tests.benchmarks.truth import (
     Path2D,
     RelationError,
+    false_meetings,
     paths,
     position_error,
     relation_error,
@@ -35,6 +37,7 @@ For comparison, mean relation errors of others, on all relations and with their 
   killian    graph mapping 0.050 m, scan matching 1.651 m; own 0.039 m"""
 HEAD = ["log", "scans", "placed", "largest", "comp.", "steps right", "ATE m", "explained"]
 HEAD += ["segments", "file kB", "ms/scan", "real time"]
+TRUST_HEAD = ["log", "false meetings", "within 2 sigma: along", "across", "turn"]
 RELATION_HEAD = ["log", "joined", "used", "mean m", "sd m", "mean °", "sd °"]
 
 
@@ -58,6 +61,12 @@ class Figures:
         [s] per scan, on a machine that may have been busy.
     duration
         [s] of the recording.
+    false_meetings
+        Pairs of stretches of the largest component that the map shows at one place, and that are
+        at two: wrong closures.
+    within_two_sigma
+        Shares of the steps that err by less than what was told of their poses: in the direction
+        held least, across it, and in heading.
     """
 
     log: str
@@ -73,6 +82,8 @@ class Figures:
     size: int
     scan_time: float
     duration: float
+    false_meetings: int
+    within_two_sigma: tuple[float, ...]
     relations: RelationError | None
 
 
@@ -126,6 +137,8 @@ def _figures(log: Log, scans: Sequence[Scan], made: Run, merged: JointMap, size:
         size=size,
         scan_time=made.seconds / len(scans),
         duration=float(np.ptp(stamps)),
+        false_meetings=false_meetings(found[0], truth),
+        within_two_sigma=tuple(within_two_sigma(made.robot_map, truth).tolist()),
         relations=relation_error(log.relations, stamps, found) if log.relations else None,
     )
 
@@ -154,6 +167,8 @@ def tell(figures: Sequence[Figures]) -> str:
     """Return the tables as text."""
     related = [_relation_row(f.log, f.relations) for f in figures if f.relations]
     parts = [format_table(HEAD, [_row(f) for f in figures])]
+    parts += ["\nPlaces taken for one another, and how well determined poses were said to be:"]
+    parts += [format_table(TRUST_HEAD, [_trust_row(f) for f in figures])]
     if related:
         parts += ["\nGround-truth relations that join the log by timestamp:"]
         parts += [format_table(RELATION_HEAD, related), COMPARISON]
@@ -175,6 +190,10 @@ def _row(f: Figures) -> list[str]:
         f"{1000 * f.scan_time:.1f}",
         f"{f.duration / (f.scan_time * f.scans):.0f}x",
     ]
+
+
+def _trust_row(f: Figures) -> list[str]:
+    return [f.log, str(f.false_meetings), *(f"{share:.1%}" for share in f.within_two_sigma)]
 
 
 def _relation_row(log: str, error: RelationError) -> list[str]:

@@ -8,7 +8,13 @@ import pytest
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from tests.benchmarks.logs import find_logs, load_scans, load_truth
-from tests.benchmarks.truth import Path2D, position_error, relation_error, steps_right
+from tests.benchmarks.truth import (
+    Path2D,
+    false_meetings,
+    position_error,
+    relation_error,
+    steps_right,
+)
 
 
 def _walk(count: int, seed: int = 1) -> FloatArray:
@@ -64,6 +70,20 @@ def test_a_step_leads_over_scans_whose_truth_is_unknown() -> None:
     path = _path(truth.copy())
     truth[4] = np.nan
     assert len(steps_right([path], truth)) == 8
+
+
+def test_a_map_that_shows_two_places_as_one_has_false_meetings_and_a_true_one_none() -> None:
+    """Two parallel corridors of 20 m, 8 m apart; the map lays one on the other."""
+    along = np.linspace(0, 20, 41)
+    there = np.column_stack([along, np.zeros((41, 2))])
+    back = np.column_stack([along[::-1], np.full(41, 8.0), np.full(41, np.pi)])
+    truth = np.vstack([there, back, there])
+    folded = truth.copy()
+    folded[41:82, 1] = 0.5
+    moved = se2.compose([5.0, 1.0, 2.0], truth)
+    assert false_meetings(_path(moved), truth) == 0
+    assert 4 <= false_meetings(_path(folded), truth) <= 30
+    assert false_meetings(_path(folded), np.full_like(truth, np.nan)) == 0
 
 
 @pytest.mark.parametrize(

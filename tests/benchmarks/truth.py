@@ -13,6 +13,8 @@ from mapweave.maps import RobotMap
 from mapweave_deploy.verdict import component_path, fit
 
 STEP_DISTANCE, STEP_TURN = 0.25, np.radians(5.0)  # [m], [rad] within which a step is right
+MEETING, NO_MEETING = 1.0, 3.0  # [m] within which scans meet, and beyond which they do not
+STRETCH, HOP = 5.0, 0.5  # [m] of path that count as one, and between the scans looked at
 STAMP_TOLERANCE = 0.005  # [s] between the stamps of a relation and of its scans
 
 
@@ -86,6 +88,25 @@ def position_error(path: Path2D, truth: FloatArray) -> float:
     squared = np.sum((placed - truth[path.index, :2]) ** 2, axis=1)
     known = squared[np.isfinite(squared)]
     return float(np.sqrt(known.mean())) if len(known) else np.nan
+
+
+def false_meetings(path: Path2D, truth: FloatArray) -> int:
+    """Return how many pairs of stretches the map shows at one place that are at two.
+
+    What a wrong closure does, whichever it was. A stretch is 5 m of path; two meet where scans of
+    both are within 1 m of each other in the map, and falsely if these are more than 3 m apart in
+    the (n, 3) `truth`.
+    """
+    known = np.isfinite(truth[path.index, 0])
+    if not known.any():
+        return 0
+    place, true = path.pose[known, :2], truth[path.index[known], :2]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(true, axis=0).T))])
+    _, kept = np.unique(way // HOP, return_index=True)  # a robot that stands meets itself a lot
+    pairs = kept[KDTree(place[kept]).query_pairs(MEETING, output_type="ndarray")]
+    apart = np.hypot(*(true[pairs[:, 0]] - true[pairs[:, 1]]).T)
+    stretches = (way[pairs[apart > NO_MEETING]] // STRETCH).astype(np.int64)
+    return len(np.unique(np.sort(stretches, axis=1), axis=0))
 
 
 @dataclass(frozen=True, slots=True)
