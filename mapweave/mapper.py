@@ -11,14 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
-from mapweave.fusion import FusionParameters
-from mapweave.loop_closing import LoopCloser, LoopParameters
 from mapweave.maps import LineMap, RobotMap, Submap
 from mapweave.names import check_id
 from mapweave.observation import Observation, ObservationParameters, observe
-from mapweave.reunion import reunite
 from mapweave.scan import Scan
-from mapweave.submap import GrowingSubmap, SubmapParameters
+from mapweave.settling import Finished, Settler, Settling, SettlingParameters
+from mapweave.submap import GrowingSubmap
 from mapweave.tracker import Tracked, Tracker, TrackerParameters
 from mapweave.uncertainty import UncertaintyParameters, pose_uncertainty, turn_uncertainty
 
@@ -31,9 +29,7 @@ class MapperParameters(BaseModel):
     observation: ObservationParameters = ObservationParameters()
     tracker: TrackerParameters = TrackerParameters()
     uncertainty: UncertaintyParameters = UncertaintyParameters()
-    submap: SubmapParameters = SubmapParameters()
-    fusion: FusionParameters = FusionParameters()
-    loops: LoopParameters = LoopParameters()
+    settling: SettlingParameters = SettlingParameters()
     patience: int = Field(
         5, ge=1, description="scans in a row that fit nowhere before the robot counts as lost"
     )
@@ -62,24 +58,39 @@ class Placement:
 
 
 class Mapper:
-    """Maps the scans of one robot."""
+    """Maps the scans of one robot.
+
+    Parameters
+    ----------
+    robot, boot
+        The robot's id, and which run of it this is.
+    settling
+        Settles finished submaps with the parameters given here, as by default it is done in
+        between; the map is the same.
+    """
 
     def __init__(
-        self, robot: str, boot: str = "0", parameters: MapperParameters | None = None
+        self,
+        robot: str,
+        boot: str = "0",
+        parameters: MapperParameters | None = None,
+        settling: Settling | None = None,
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
         self.parameters = parameters or MapperParameters()
         self._version = 0
         self._finished: list[Submap] = []
-        self._component = 0
+        self._component = self._newest_component = 0
         self._tracker = Tracker(self.parameters.tracker)
-        self._growing = GrowingSubmap(self.parameters.submap)
+        self._growing = GrowingSubmap(self.parameters.settling.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         self._waiting: list[Observation] = []
-        self._loops = LoopCloser(self.parameters.loops)
+        self._settling = settling or Settler(self.parameters.settling)
+        self._unsettled = False  # whether the last finished submap is being settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
+        self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
 
     def add(self, scan: Scan) -> Placement:
         """Take the next scan."""
@@ -101,6 +112,7 @@ class Mapper:
         """Finish the growing submap, as at the end of a log, and return the map."""
         if not self._growing.is_empty:
             self._finish_submap()
+        self._adopt_settled()
         return self.robot_map()
 
     def robot_map(self) -> RobotMap:
@@ -143,7 +155,10 @@ class Mapper:
         waiting, self._waiting = self._waiting, []
         if not self._growing.is_empty:
             self._finish_submap()
-        self._component = 1 + max((s.component for s in self._finished), default=-1)
+        if any(s.component == self._component for s in self._finished):
+            # A number is used once: one that joined another component is not given again.
+            self._newest_component += 1
+            self._component = self._newest_component
         self._follows = False
         self._tracker = Tracker(self.parameters.tracker)
         self._origin = self._frame = se2.IDENTITY
@@ -161,23 +176,35 @@ class Mapper:
         held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
         held = turn_uncertainty(held, -self._frame[2])
         self._growing.add(seen.scan, seen.lines.segments, local, held)
+        self._merged[seen.scan.index] = seen
         self._version += 1
 
     def _finish_submap(self) -> None:
-        """Close the growing submap, and join its component to an older one where shapes allow."""
-        submaps = [*self._finished, self._submap()]
-        if self._follows and len(submaps) > 1:
-            self._loops.track(submaps[-2], submaps[-1])
-        submaps, joints = reunite(submaps, self.parameters.fusion)
-        for older, younger in joints:
-            self._loops.join(submaps[older], submaps[younger])
-        self._finished = self._loops.close(submaps)
-        self._follows = True
-        last = self._finished[-1]
-        self._component = last.component
-        self._origin = se2.compose(last.pose, se2.inverse(self._frame))
-        self._growing = GrowingSubmap(self.parameters.submap)
+        """Have the growing submap settled, adopt what became of the one before, start another."""
+        self._adopt_settled()
+        submap = self._submap()
+        scans = tuple(self._merged[k] for k in submap.trajectory.scan_index.tolist())
+        self._settling.begin(Finished(submap, scans, self._follows))
+        self._finished.append(submap)
+        self._unsettled = self._follows = True
+        self._growing = GrowingSubmap(self.parameters.settling.submap)
+        self._merged = {}
         self._version += 1
+
+    def _adopt_settled(self) -> None:
+        """Move everything to where it settled, the growing submap with the last scan before it."""
+        settled = self._settling.take() if self._unsettled else None
+        self._unsettled = False
+        if settled is None:
+            return
+        before = _end(self._finished[-1])
+        self._finished = settled.applied(self._finished)
+        self._version += 1
+        if self._follows:
+            after = _end(self._finished[-1])
+            self._component = self._finished[-1].component
+            moved = se2.compose(after, se2.inverse(before))
+            self._origin = se2.compose(moved, self._origin)
 
     def _submap(self) -> Submap:
         return Submap(
@@ -187,3 +214,8 @@ class Mapper:
             self._growing.line_map(),
             self._growing.trajectory(),
         )
+
+
+def _end(submap: Submap) -> FloatArray:
+    """(3,) the pose of a submap's last scan, component frame."""
+    return se2.compose(submap.pose, submap.trajectory.pose[-1])

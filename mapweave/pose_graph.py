@@ -37,16 +37,20 @@ class Link:
     trusted: bool
 
 
-ANCHOR_SIGMAS = (1e-4, 1e-4, 1e-5)  # [m, m, rad]: the first pose stays where it is
+ANCHOR_SIGMAS = (1e-4, 1e-4, 1e-5)  # [m, m, rad]: a fixed pose stays where it is
 
 
-def optimise(poses: FloatArray, links: Sequence[Link]) -> tuple[FloatArray, BoolArray]:
+def optimise(
+    poses: FloatArray, links: Sequence[Link], fixed: Sequence[int] = (0,)
+) -> tuple[FloatArray, BoolArray]:
     """Return the poses (n, 3) that fit `links` best, and which (k,) links they rely on.
 
     Parameters
     ----------
     poses
-        (n, 3) first guesses; the first one is kept. Links must connect all.
+        (n, 3) first guesses. Links must connect all.
+    fixed
+        Which of them are kept, one at least.
     """
     graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
     anchor = gtsam.noiseModel.Diagonal.Sigmas(np.array(ANCHOR_SIGMAS))
@@ -56,10 +60,11 @@ def optimise(poses: FloatArray, links: Sequence[Link]) -> tuple[FloatArray, Bool
         noise = gtsam.noiseModel.Gaussian.Covariance(link.covariance)
         measured = gtsam.Pose2(*link.transform)
         graph.add(gtsam.BetweenFactorPose2(link.first, link.second, measured, noise))
-    graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*poses[0]), anchor))
+    for key in fixed:
+        graph.add(gtsam.PriorFactorPose2(key, gtsam.Pose2(*poses[key]), anchor))
     parameters = gtsam.GncLMParams()
     trusted = [k for k, link in enumerate(links) if link.trusted]
-    parameters.setKnownInliers([*trusted, len(links)])
+    parameters.setKnownInliers([*trusted, *range(len(links), len(links) + len(fixed))])
     optimiser = gtsam.GncLMOptimizer(graph, start, parameters)
     values = optimiser.optimize()
     fitted = [values.atPose2(key) for key in range(len(poses))]

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from mapweave.cli import Command, argument
 from mapweave.fusion import align_robots
-from mapweave.mapper import Mapper
+from mapweave.mapper import Mapper, MapperParameters
 from mapweave.names import check_id
 from mapweave.scan_range import ScanRange
 from mapweave_agent.agent import Agent
 from mapweave_agent.comparer import Comparer
 from mapweave_agent.planning import AgentParameters
+from mapweave_agent.settling import SettlingProcess
 from mapweave_agent.source import LogSource, Pace, parse_rate
 from mapweave_protocol.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.keys import new_boot
@@ -63,11 +64,13 @@ def _run(options: argparse.Namespace) -> int:
     def tell_waiting() -> None:
         _log.info("waiting for a router at %s", ", ".join(endpoints))
 
+    mapping = MapperParameters()
     with (
         Comparer(align_robots) as comparer,
+        SettlingProcess(mapping.settling) as settling,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        mapper = Mapper(robot, new_boot())
+        mapper = Mapper(robot, new_boot(), mapping, settling)
         parameters = AgentParameters(map_interval=options.map_interval)
         agent = Agent(session, team, mapper, comparer, source.total, parameters)
         agent.run(source.scans(), pace, stop_on_signal())

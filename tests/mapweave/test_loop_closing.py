@@ -100,7 +100,7 @@ def walk(
         step = se2.compose(se2.between(last.pose, new.pose), error)
         pose = se2.compose(known[-1].pose, step)
         known.append(Submap(new.id, new.component, pose, new.map, new.trajectory))
-        closer.track(known[-2], known[-1])
+        closer.graph.track(known[-2], known[-1])
         known = closer.close(known)
     return known
 
@@ -243,7 +243,7 @@ def test_a_submap_of_another_component_is_left_to_fusion() -> None:
     first, second, third = true
     apart = Submap(2, 1, np.array([0.3, -0.3, 0]), third.map, third.trajectory)
     closer = LoopCloser(LoopParameters())
-    closer.track(first, second)
+    closer.graph.track(first, second)
     assert closer.close([first, second, apart]) == [first, second, apart]
 
 
@@ -297,8 +297,8 @@ def test_where_components_were_joined_gives_way_before_tracking_does() -> None:
     error = np.array([0.15, 0.1, 0.01])
     last = Submap(2, 0, se2.compose(third.pose, error), third.map, third.trajectory)
     closer = LoopCloser(LoopParameters())
-    closer.join(first, second)
-    closer.track(second, last)
+    closer.graph.join(first, second)
+    closer.graph.track(second, last)
     given = poses(closer.close([first, second, last])) - poses([first, second, last])
     left = error[:2] + given[2, :2]
     assert np.hypot(*left) < 0.6 * np.hypot(*error[:2])

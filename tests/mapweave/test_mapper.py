@@ -125,7 +125,8 @@ def test_submaps_are_of_a_bounded_path_and_number_from_0(followed: Run) -> None:
     for submap in followed.map.submaps:
         path = np.hypot(*np.diff(submap.trajectory.pose[:, :2], axis=0).T).sum()
         assert path < 14
-        np.testing.assert_allclose(submap.trajectory.pose[0], 0, atol=1e-12)
+        # Its frame is where its first scan was tracked to; refined, the scan is nearly there.
+        np.testing.assert_allclose(submap.trajectory.pose[0], 0, atol=0.1)
 
 
 def test_a_placement_says_when_a_submap_was_finished(followed: Run) -> None:

@@ -9,7 +9,7 @@ from mapweave.arrays import FloatArray
 from mapweave.assembly import place
 from mapweave.fusion import FusionParameters
 from mapweave.maps import LineMap, Submap, Trajectory
-from mapweave.reunion import reunite
+from mapweave.reunion import Reunion
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, part, random_pose, shaken
 
 P = FusionParameters()
@@ -36,7 +36,7 @@ def test_a_component_that_shares_a_shape_with_an_older_one_joins_it(
         pose = random_pose(rng)
         inside = submap(k, 1, pose, parts[k])
         submaps.append(Submap(k, 1, se2.compose(lost, pose), inside.map, inside.trajectory))
-    joined, joints = reunite(submaps, P)
+    joined, joints = Reunion(P).reunite(submaps)
     assert [s.component for s in joined] == [0, 0, 0, 0]
     assert [s.id for s in joined] == [0, 1, 2, 3]
     assert joints == [(0, 2)]
@@ -55,13 +55,13 @@ def test_a_component_of_another_place_stays_apart(parts: list[LineMap], rng: Gen
         submap(0, 0, random_pose(rng), parts[0]),
         submap(1, 1, random_pose(rng), part(OTHER_BUILDING, 0, 26)),
     ]
-    assert reunite(submaps, P) == (submaps, [])
+    assert Reunion(P).reunite(submaps) == (submaps, [])
 
 
 def test_one_component_is_left_as_it_is(parts: list[LineMap]) -> None:
     submaps = [submap(0, 3, np.zeros(3), parts[0]), submap(1, 3, np.zeros(3), parts[1])]
-    assert reunite(submaps, P) == (submaps, [])
+    assert Reunion(P).reunite(submaps) == (submaps, [])
 
 
 def test_no_submaps_are_no_components() -> None:
-    assert reunite([], P) == ([], [])
+    assert Reunion(P).reunite([]) == ([], [])
