@@ -20,7 +20,7 @@ OCCUPIED = 0.25  # share of the beams at a cell that end there; GMapping's occ_t
 WALL, FREE, UNKNOWN = 0, 254, 205  # grey, as map_server writes its pictures
 
 
-def view_stretches(log: Log, count: int) -> list[View]:
+def view_stretches(log: Log, count: int, cell: float = CELL) -> list[View]:
     """Cut `log` into `count` stretches as the fusion benchmark does and view each."""
     scans = load_scans(log)
     truth = load_truth(log, np.array([scan.stamp for scan in scans]))
@@ -30,23 +30,30 @@ def view_stretches(log: Log, count: int) -> list[View]:
         inside = scans[bounds[k] : bounds[k + 1]]
         known = [scan for scan in inside if np.isfinite(truth[scan.index, 0])]
         poses = truth[[scan.index for scan in known]]
-        views.append(view(f"{log.name} {k + 1}/{count}", log, known, poses))
+        views.append(view(f"{log.name} {k + 1}/{count}", log, known, poses, cell))
     return views
 
 
-def view(name: str, log: Log, scans: Sequence[Scan], poses: FloatArray) -> View:
-    """Return what `scans` saw at the (n, 3) `poses`, in the frame of the first of them."""
+def view(name: str, log: Log, scans: Sequence[Scan], poses: FloatArray, cell: float = CELL) -> View:
+    """Return what `scans` saw at the (n, 3) `poses`, in the frame of the first of them.
+
+    The side of its grid's pixels is `cell` [m].
+    """
     start = poses[0]
     placed = se2.between(start, poses)
     walls = thin(returns_at(scans, placed), APART)
-    grid = render(scans, placed, CELL)
+    grid = render(scans, placed, cell)
     cells = wall_cells(returns_at(scans, poses))
     return View(name, log, walls, grid, cells, Part(start, 0.0, walls))
 
 
 def thin(points: FloatArray, cell: float) -> FloatArray:
-    """Return the middle of each cell [m] that holds some of the (n, 2) or (n, 3) `points`."""
-    return np.asarray((np.unique(np.floor(points / cell), axis=0) + 0.5) * cell)
+    """Return the mean of the (n, 2) `points` in each cell [m] that holds some."""
+    held, counts = np.unique(
+        np.floor(points / cell), axis=0, return_inverse=True, return_counts=True
+    )[1:]
+    sums = [np.bincount(held.ravel(), weights=axis) for axis in points.T]
+    return np.asarray(np.column_stack(sums) / counts[:, None])
 
 
 def render(scans: Sequence[Scan], poses: FloatArray, cell: float) -> Grid:

@@ -19,7 +19,7 @@ from tests.benchmarks.peer_kiss import kiss_peer
 from tests.benchmarks.peer_sweep import sweep_peer
 from tests.benchmarks.peer_trials import Trial, trial_of, try_peer
 from tests.benchmarks.peer_types import Peer, View
-from tests.benchmarks.peer_views import view_stretches
+from tests.benchmarks.peer_views import CELL, view_stretches
 from tests.benchmarks.stretches import Stretch, map_stretches
 from tests.benchmarks.tables import OUTPUT, write_json
 
@@ -36,6 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--across", type=int, default=200, metavar="N", help="pairs across buildings at most (200)"
     )
+    parser.add_argument(
+        "--cell", type=float, default=CELL, metavar="M", help="of the grids (%(default)s m)"
+    )
     parser.add_argument("--pairs", type=int, metavar="N", help="only so many of all, drawn")
     parser.add_argument("--seed", type=int, default=1, help="draws pairs (1)")
     parser.add_argument(
@@ -47,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Let every peer guess the pairs, print the table, write the rows."""
     logs = find_logs(options.logs)
-    views = _view_all(logs, [options.stretches])
+    views = _view_all(logs, [options.stretches], options.cell)
     stretches = (
         [stretch for log in logs for stretch in map_stretches(log, options.stretches)]
         if options.mapweave
@@ -73,7 +76,7 @@ def tell_beside(
         Where the peers' rows go, as JSON.
     """
     pairs = [(pair.first, pair.second) for pair in own]
-    return _meet(_view_all(logs, counts), pairs, own, output)
+    return _meet(_view_all(logs, counts, CELL), pairs, own, output)
 
 
 def find_peers() -> list[Peer]:
@@ -94,9 +97,9 @@ def _find(module: str, who: str) -> ModuleType | None:
         return None
 
 
-def _view_all(logs: Sequence[Log], counts: Sequence[int]) -> dict[str, View]:
-    views = [view for count in counts for log in logs for view in view_stretches(log, count)]
-    return {view.name: view for view in views}
+def _view_all(logs: Sequence[Log], counts: Sequence[int], cell: float) -> dict[str, View]:
+    cuts = [(log, count) for count in counts for log in logs]
+    return {view.name: view for cut in cuts for view in view_stretches(*cut, cell)}
 
 
 def _unmapped(view: View) -> Stretch:
