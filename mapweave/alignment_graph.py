@@ -192,9 +192,14 @@ class _Graph:
         """Yield the edges `inside`, and of each whether all hangs on it: nothing can refute it."""
         count = len(self._names)
         parts = len(groups(count, self._edges, inside))
+        _, paths = poses_along(self._edges[inside[0]].first, count, self._edges, inside)
         for k in inside:
+            is_needed = any(path > 0 and path >> k & 1 for path in paths)
             rest = [other for other in inside if other != k]
-            yield self._edges[k], len(groups(count, self._edges, rest)) > parts
+            yield (
+                self._edges[k],
+                is_needed and len(groups(count, self._edges, rest)) > parts,
+            )
 
 
 def _middle(raster: MapRaster | None) -> FloatArray:

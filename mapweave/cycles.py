@@ -59,7 +59,7 @@ def bad_cycles(count: int, edges: Sequence[Edge], removed: int, p: CycleParamete
     present = [k for k in range(len(edges)) if not removed >> k & 1]
     found: set[int] = set()
     for root in range(count):
-        found.update(_bad_cycles_through(root, count, edges, present, p))
+        found.update(bad_cycles_through(root, count, edges, present, p))
     return sorted(found, key=lambda mask: (mask.bit_count(), mask))[: p.max_cycles]
 
 
@@ -75,17 +75,20 @@ def poses_along(
     paths
         For each node a bit mask of the edges from `root`; -1 where there is no way.
     """
-    steps: list[list[tuple[int, int, FloatArray]]] = [[] for _ in range(count)]
+    steps: list[list[int]] = [[] for _ in range(count)]
     for k in present:
-        edge = edges[k]
-        steps[edge.first].append((k, edge.second, edge.transform))
-        steps[edge.second].append((k, edge.first, se2.inverse(edge.transform)))
+        steps[edges[k].first].append(k)
+        steps[edges[k].second].append(k)
     poses, paths = np.full((count, 3), np.nan), [-1] * count
     poses[root], paths[root] = 0.0, 0
     reached = [root]
     for here in reached:  # grows meanwhile: nodes in the order of their steps from the root
-        for k, there, step in steps[here]:
+        for k in steps[here]:
+            edge = edges[k]
+            forward = edge.first == here
+            there = edge.second if forward else edge.first
             if paths[there] < 0:
+                step = edge.transform if forward else se2.inverse(edge.transform)
                 poses[there] = se2.compose(poses[here], step)
                 paths[there] = paths[here] | 1 << k
                 reached.append(there)
@@ -97,10 +100,10 @@ def misfit(transform: FloatArray, first: FloatArray, second: FloatArray) -> Floa
     return se2.between(transform, se2.between(first, second))
 
 
-def _bad_cycles_through(
+def bad_cycles_through(
     root: int, count: int, edges: Sequence[Edge], present: Sequence[int], p: CycleParameters
 ) -> list[int]:
-    """Of each present edge, the cycle that it closes with the shortest paths from `root`."""
+    """Return those that do not close, of an edge and the shortest paths to it from `root`."""
     poses, paths = poses_along(root, count, edges, present)
     here = [k for k in present if paths[edges[k].first] >= 0]
     # What two paths have in common cancels: it is no part of the cycle.

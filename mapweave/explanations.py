@@ -22,7 +22,7 @@ from typing import NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.cycles import CycleParameters, Edge, bad_cycles
+from mapweave.cycles import CycleParameters, Edge, bad_cycles, bad_cycles_through
 
 
 class ExplanationParameters(BaseModel):
@@ -180,6 +180,8 @@ class _Search:
         for cycle in self._cycles:
             if not cycle & removed:
                 return cycle
+        if not removed:
+            return 0  # all were looked at in the beginning
         news = bad_cycles(self._count, self._edges, removed, self._p.cycles)
         self._cycles += news
         return news[0] if news else 0
@@ -208,11 +210,17 @@ class _Search:
         return closing
 
     def _remove_greedily(self, removed: int) -> _Candidate:
+        """Remove what is in most cycles until all close; then bring back what still agrees."""
         while self._bad_cycle(removed):
             left = [cycle for cycle in self._cycles if not cycle & removed]
             counts = [sum(cycle >> k & 1 for cycle in left) for k in range(len(self._edges))]
             worst = max(range(len(counts)), key=lambda k: (counts[k], -self._odds[k]))
             removed |= 1 << worst
+        for k in sorted(bits(removed), key=lambda k: -self._odds[k]):
+            present = [j for j in range(len(self._edges)) if j == k or not removed >> j & 1]
+            root = self._edges[k].first
+            if not bad_cycles_through(root, self._count, self._edges, present, self._p.cycles):
+                removed &= ~(1 << k)
         return _Candidate(self._cost(removed), removed)
 
 
