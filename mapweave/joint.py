@@ -4,8 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+from shapely.geometry.base import BaseGeometry
 
 from mapweave.alignment_graph import Cluster, GraphParameters, cluster_components
+from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
 from mapweave.free_space import FreeSpaceParameters, from_rings, rings, unite
 from mapweave.map_raster import MapRaster, RasterParameters
@@ -13,6 +15,7 @@ from mapweave.maps import Alignment, JointComponent, JointMap, LineMap
 from mapweave.merging import MergingParameters, evolve
 from mapweave.polylines import group_polylines
 from mapweave.segment_confidence import SegmentConfidenceParameters, segment_confidence
+from mapweave.simplification import SimplificationParameters, simplify, sources
 
 
 class JointParameters(BaseModel):
@@ -22,6 +25,7 @@ class JointParameters(BaseModel):
 
     graph: GraphParameters = GraphParameters()
     merging: MergingParameters = MergingParameters(max_step=0.25, max_cost=0.2)
+    simplification: SimplificationParameters = SimplificationParameters()
     free_space: FreeSpaceParameters = FreeSpaceParameters()
     raster: RasterParameters = RasterParameters()
     max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
@@ -58,15 +62,23 @@ def _join(
 ) -> JointComponent:
     placed = [place(components[name], pose) for name, pose in cluster.poses.items()]
     everything = unite_lines(placed)
-    lengths = np.hypot(*(everything.segments[:, 2:] - everything.segments[:, :2]).T)
-    merged = evolve(everything.segments, lengths * everything.support, p.merging)
-    support = np.bincount(
-        merged.labels, weights=everything.support, minlength=len(merged.segments)
-    ).astype(np.int64)
-    order, polyline = group_polylines(merged.segments, p.max_gap)
-    free = rings(unite([from_rings(everything.free_space)], p.free_space))
-    lines = LineMap(merged.segments[order], polyline, support[order], free)
+    free = unite([from_rings(everything.free_space)], p.free_space)
+    walls = _merged(everything, free, p)
+    wall, source = sources(walls, everything.segments)
+    support = np.bincount(wall, everything.support[source], minlength=len(walls))
+    order, polyline = group_polylines(walls, p.max_gap)
+    lines = LineMap(
+        walls[order], polyline, np.maximum(support, 1).astype(np.int64)[order], rings(free)
+    )
     views = [(rasters[name], pose) for name, pose in cluster.poses.items() if name in rasters]
     return JointComponent(
         cluster.poses, cluster.confidence, lines, segment_confidence(lines, views, p.segments)
     )
+
+
+def _merged(everything: LineMap, free: BaseGeometry, p: JointParameters) -> FloatArray:
+    """Return (n, 4) the walls of all submaps, merged (paper, VI) and simplified."""
+    seen, support = everything.segments, everything.support
+    lengths = np.hypot(*(seen[:, 2:] - seen[:, :2]).T)
+    merged = evolve(seen, lengths * support, p.merging).segments
+    return simplify(merged, seen, support, free, p.simplification)

@@ -13,6 +13,8 @@ from mapweave.maps import LineMap, Trajectory
 from mapweave.merging import MergingParameters, count_support, merge_scan
 from mapweave.polylines import group_polylines
 from mapweave.scan import Scan
+from mapweave.selection import SelectionParameters
+from mapweave.simplification import SimplificationParameters, simplify, sources
 from mapweave.slivers import absorb_slivers
 from mapweave.uncertainty import EXACT
 from mapweave.vanished import VanishedParameters, Witness, last_sightings, still_there
@@ -34,14 +36,22 @@ class SubmapParameters(BaseModel):
     merging: MergingParameters = MergingParameters()
     free_space: FreeSpaceParameters = FreeSpaceParameters()
     vanished: VanishedParameters = VanishedParameters()
+    simplification: SimplificationParameters = SimplificationParameters(
+        selection=SelectionParameters(price=0.05)  # what is little here may be much together
+    )
 
 
 @dataclass(slots=True)
 class _Sightings:
-    """Which scan saw what became which segment."""
+    """Segments as scans saw them, (n, 4) [m]; which scan, and which merged segment they are in."""
 
+    segments: FloatArray
     labels: IntArray
     scans: IntArray
+
+    @classmethod
+    def none(cls) -> "_Sightings":
+        return cls(np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 
 
 class GrowingSubmap:
@@ -51,7 +61,7 @@ class GrowingSubmap:
         self._parameters = parameters
         self._segments: FloatArray = np.empty((0, 4))
         self._weights: FloatArray = np.empty(0)
-        self._sightings = _Sightings(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+        self._sightings = _Sightings.none()
         self._cleared: list[BaseGeometry] = []
         self._witnesses: list[Witness] = []
         self._indices: list[int] = []
@@ -107,26 +117,48 @@ class GrowingSubmap:
         )
 
     def line_map(self) -> LineMap:
-        """Return the lines and the free space seen so far."""
-        outlines = rings(unite(self._cleared, self._parameters.free_space))
-        return replace(self.lines(), free_space=outlines)
+        """Return the lines, simplified, and the free space seen so far."""
+        p, seen = self._parameters, self._sightings
+        free = unite(self._cleared, p.free_space)
+        merged, labels, left, _ = self._standing()
+        kept = np.flatnonzero(np.isin(labels, left))
+        sightings, scans = seen.segments[kept], seen.scans[kept]
+        once = np.ones(len(kept), dtype=np.int64)
+        walls = simplify(merged[left], sightings, once, free, p.simplification)
+        wall, source = sources(walls, sightings)
+        found, labels = np.unique(wall, return_inverse=True)
+        lines = self._grouped(walls[found], *self._still_there(walls[found], labels, scans[source]))
+        return replace(lines, free_space=rings(free))
 
     def lines(self) -> LineMap:
-        """Return the lines alone, without those that were seen through since they were seen."""
-        p = self._parameters
+        """Return the lines alone, not simplified: fast enough for every scan."""
+        merged, _, left, support = self._standing()
+        return self._grouped(merged, left, support)
+
+    def _standing(self) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+        """Return merged segments, whose each sighting is, which are left, and their support."""
         whole = absorb_slivers(self._segments, self._weights)
-        labels, scans = whole.labels[self._sightings.labels], self._sightings.scans
-        support = count_support(labels, scans)
-        last = last_sightings(labels, scans)
-        left, support = still_there(whole.segments, support, last, self._witnesses, p.vanished)
-        order, polyline = group_polylines(whole.segments[left], p.max_gap)
-        return LineMap(whole.segments[left][order], polyline, support[order])
+        labels = whole.labels[self._sightings.labels]
+        left, support = self._still_there(whole.segments, labels, self._sightings.scans)
+        return whole.segments, labels, left, support
+
+    def _still_there(
+        self, segments: FloatArray, labels: IntArray, scans: IntArray
+    ) -> tuple[IntArray, IntArray]:
+        """Return which segments were not seen through since they were seen, and their support."""
+        support, last = count_support(labels, scans), last_sightings(labels, scans)
+        return still_there(segments, support, last, self._witnesses, self._parameters.vanished)
+
+    def _grouped(self, segments: FloatArray, left: IntArray, support: IntArray) -> LineMap:
+        order, polyline = group_polylines(segments[left], self._parameters.max_gap)
+        return LineMap(segments[left][order], polyline, support[order])
 
     def _merge(self, scan: int, segments: FloatArray) -> None:
         evolution = merge_scan(self._segments, self._weights, segments, self._parameters.merging)
         known = evolution.labels[: len(self._segments)]
         fresh = evolution.labels[len(self._segments) :]
         self._sightings = _Sightings(
+            np.concatenate([self._sightings.segments, segments]),
             np.concatenate([known[self._sightings.labels], fresh]),
             np.concatenate([self._sightings.scans, np.full(len(fresh), scan)]),
         )

@@ -49,7 +49,9 @@ def test_the_joint_map_of_one_map_is_itself() -> None:
     assert list(component.robots) == ["a/0"] and component.confidence == 1.0
     np.testing.assert_array_equal(component.robots["a/0"], np.zeros(3))
     order = [np.lexsort(lines.segments.T) for lines in (component.map, LEFT)]
-    np.testing.assert_allclose(component.map.segments[order[0]], LEFT.segments[order[1]])
+    np.testing.assert_allclose(
+        component.map.segments[order[0]], LEFT.segments[order[1]], atol=1e-12
+    )
     assert (component.map.support == 5).all()
 
 

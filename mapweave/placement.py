@@ -1,0 +1,143 @@
+"""Where a segment lies best: on the evidence around it, and no farther than that reaches.
+
+Merging averages what it merges (paper, VII). Here segments are fitted to all that was seen about
+them at once, by least squares, and cut where the same face is rather somewhere else, close by: a
+wall that is bent, or was seen twice at different places.
+"""
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.arrays import BoolArray, FloatArray, IntArray
+from mapweave.evidence import Evidence, Nearness, units
+
+
+class PlacementParameters(BaseModel):
+    """What belongs to a segment, and where it ends."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    tolerance: float = Field(
+        0.08, gt=0, description="[m] to either side, what is of the segment's surface"
+    )
+    shadow: float = Field(0.3, gt=0, description="[m] to either side, where it might be instead")
+    parallel: float = Field(
+        np.deg2rad(30.0), gt=0, description="[rad] within which the same face is meant"
+    )
+    reach: float = Field(0.3, ge=0, description="[m] beyond its ends, what a fit may take up")
+    station: float = Field(0.1, gt=0, description="[m] of a segment that is kept or cut as one")
+    max_hole: float = Field(
+        0.3, ge=0, description="[m] without evidence that a segment bridges; half a narrow door"
+    )
+    rounds: int = Field(1, ge=0, description="of fitting")
+
+
+def fit(segments: FloatArray, evidence: Evidence, parameters: PlacementParameters) -> FloatArray:
+    """Return (n, 4) `segments` [m] where the evidence about them is, by least squares across."""
+    for _ in range(parameters.rounds):
+        segments = _fit_once(segments, evidence, parameters)
+    return segments
+
+
+def cut(segments: FloatArray, evidence: Evidence, parameters: PlacementParameters) -> FloatArray:
+    """Return (m, 4) the parts of `segments` [m] on which more evidence lies than close beside."""
+    p = parameters
+    near = Nearness.of(segments, evidence.points, evidence.directions, p.shadow)
+    same = _same_face(near, segments, 0.0, p)
+    station = np.floor(near.along / p.station).astype(np.int64)
+    width = int(station.max(initial=0)) + 2
+    key = (near.segment * width + station)[same]
+    on = np.abs(near.across[same]) <= p.tolerance
+    weight = evidence.weights[near.sample[same]]
+    keys, place = np.unique(key, return_inverse=True)
+    balance = np.bincount(place, np.where(on, weight, -weight), minlength=len(keys))
+    kept = keys[balance > 0]
+    return _runs(segments, kept // width, kept % width, p)
+
+
+def trim(
+    segments: FloatArray,
+    near: Nearness,
+    explains: BoolArray,
+    settles: BoolArray,
+    evidence: Evidence,
+) -> FloatArray:
+    """Return (n, 4) `segments` [m] without the ends on which nothing lies that is theirs alone.
+
+    What several settle is the first one's. `explains` and `settles` (k,) tell which pairs are of
+    a segment and what it explains, or what it leaves nothing to explain of.
+    """
+    first = np.full(len(evidence), len(segments))
+    np.minimum.at(first, near.sample[settles], near.segment[settles])
+    own = explains & (first[near.sample] == near.segment)
+    along, owner = near.along[own], near.segment[own]
+    directions, lengths = units(segments)
+    low, high = np.full(len(segments), np.inf), np.full(len(segments), -np.inf)
+    np.minimum.at(low, owner, along - evidence.spacing / 2)
+    np.maximum.at(high, owner, along + evidence.spacing / 2)
+    low = np.clip(low, 0.0, lengths)[:, None]
+    high = np.maximum(np.clip(high, 0.0, lengths)[:, None], low)
+    start = segments[:, :2]
+    return np.hstack([start + low * directions, start + high * directions])
+
+
+def _runs(
+    segments: FloatArray, segment: IntArray, station: IntArray, p: PlacementParameters
+) -> FloatArray:
+    """Return the parts of `segments` with kept stations, ascending, and no wide hole."""
+    if not len(segment):
+        return np.empty((0, 4))
+    holes = (np.diff(station) - 1) * p.station > p.max_hole + 1e-9
+    first = np.concatenate([[True], (np.diff(segment) > 0) | holes])
+    last = np.concatenate([first[1:], [True]])
+    owner = segment[first]
+    directions, lengths = units(segments[owner])
+    low = station[first] * p.station
+    high = np.minimum((station[last] + 1) * p.station, lengths)
+    start = segments[owner, :2]
+    return np.hstack([start + low[:, None] * directions, start + high[:, None] * directions])
+
+
+def _fit_once(segments: FloatArray, evidence: Evidence, p: PlacementParameters) -> FloatArray:
+    near = Nearness.of(segments, evidence.points, evidence.directions, max(p.tolerance, p.reach))
+    used = _same_face(near, segments, p.reach, p) & (np.abs(near.across) <= p.tolerance)
+    owner, points = near.segment[used], evidence.points[near.sample[used]]
+    weight = evidence.weights[near.sample[used]]
+    n = len(segments)
+    mass = np.bincount(owner, weight, minlength=n)
+    known = mass > 0
+    total = np.where(known, mass, 1.0)
+    sums = np.column_stack([np.bincount(owner, weight * x, minlength=n) for x in points.T])
+    middle = sums / total[:, None]
+    direction = _major_axes(points - middle[owner], weight, owner, segments)
+    along = ((points - middle[owner]) * direction[owner]).sum(axis=1)
+    low, high = np.full(n, np.inf), np.full(n, -np.inf)
+    np.minimum.at(low, owner, along)
+    np.maximum.at(high, owner, along)
+    seen = high > low
+    low, high = np.where(seen, low, 0.0)[:, None], np.where(seen, high, 0.0)[:, None]
+    half = evidence.spacing / 2
+    ends = [middle + (low - half) * direction, middle + (high + half) * direction]
+    return np.where((seen & known)[:, None], np.hstack(ends), segments)
+
+
+def _major_axes(
+    offsets: FloatArray, weight: FloatArray, owner: IntArray, segments: FloatArray
+) -> FloatArray:
+    """Return (n, 2) unit vectors of the most scatter, directed as `segments`."""
+    n = len(segments)
+    (x, y) = offsets.T
+    xx, xy, yy = (np.bincount(owner, weight * s, minlength=n) for s in (x * x, x * y, y * y))
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    axis = np.column_stack([np.cos(angle), np.sin(angle)])
+    directions, _ = units(segments)
+    return np.where((axis * directions).sum(axis=1)[:, None] < 0, -axis, axis)
+
+
+def _same_face(
+    near: Nearness, segments: FloatArray, reach: float, p: PlacementParameters
+) -> BoolArray:
+    """Return (k,) which samples lie beside the segment or at most `reach` [m] beyond its ends."""
+    _, lengths = units(segments)
+    beside = (near.along >= -reach) & (near.along <= lengths[near.segment] + reach)
+    return np.asarray(beside & (near.cosine >= np.cos(p.parallel)))
