@@ -1,4 +1,4 @@
-"""``python -m tests.benchmarks [figure2 | map | kidnap | fusion | peers | confidence | wire]``."""
+"""``python -m tests.benchmarks NAME``, such as ``map``; ``--help`` lists the names."""
 
 import argparse
 import io
@@ -6,7 +6,16 @@ import sys
 import time
 from typing import Protocol
 
-from tests.benchmarks import figure2, fit_confidence, fusion, kidnap, mapping, peers, wire
+from tests.benchmarks import (
+    endurance,
+    figure2,
+    fit_confidence,
+    fusion,
+    kidnap,
+    mapping,
+    peers,
+    wire,
+)
 
 
 class Benchmark(Protocol):
@@ -25,6 +34,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "figure2": figure2,
     "map": mapping,
     "kidnap": kidnap,
+    "endurance": endurance,
     "fusion": fusion,
     "peers": peers,
     "confidence": fit_confidence,
