@@ -12,12 +12,14 @@ from typing import TypeAlias
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.assembly import assemble
+from mapweave.carrying import Change, SubmapPlace, carry, places_of
 from mapweave.joint import build_joint_map
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name
 from mapweave.revocation import mark_revoked
 from mapweave_protocol.messages import AlignmentMessage, MapVersion
 
 Run: TypeAlias = tuple[str, str]  # robot and boot
+REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
 
 
 class CoordinatorParameters(BaseModel):
@@ -88,6 +90,7 @@ class Coordinator:
         self._judged = last.alignments if last else ()
         self._names: set[str] = set()
         self._maps: dict[str, RobotMap] = {}
+        self._states: dict[str, dict[int, dict[int, SubmapPlace]]] = {}
         self._alignments: dict[frozenset[str], AlignmentMessage] = {}
         self._runs_over: set[Run] = set()
         self._urgency = Urgency.NONE
@@ -122,9 +125,11 @@ class Coordinator:
         known = self._maps.get(new.robot)
         if known is not None and known.boot != new.boot:
             self._runs_over.add(_run(known))
+            del self._states[new.robot]
         elif known is not None and known.version >= new.version:
             return False
         self._maps[new.robot] = new
+        self._remember_state(new)
         self._raise_urgency(Urgency.SOON)
         return True
 
@@ -185,9 +190,24 @@ class Coordinator:
         }
         for message in self._alignments.values():
             if runs.issuperset(_sources(message)):
+                changes = {k.robot: self._change(k) for k in (message.reference, message.other)}
                 for alignment in message.unpack():
                     if {alignment.reference, alignment.other} <= existing:
-                        yield alignment
+                        ends = alignment.reference, alignment.other
+                        ours, theirs = (changes[name.split("/")[0]] for name in ends)
+                        yield carry(alignment, ours, theirs)
+
+    def _remember_state(self, robot_map: RobotMap) -> None:
+        states = self._states.setdefault(robot_map.robot, {})
+        states[robot_map.version] = places_of(robot_map)
+        while len(states) > REMEMBERED_STATES:
+            del states[min(states)]
+
+    def _change(self, source: MapVersion) -> Change:
+        """Return what became of a map since the state `source`; nothing, if that is not known."""
+        now = self._maps[source.robot]
+        then = self._states[source.robot].get(source.version)
+        return Change(places_of(now) if then is None else then, now)
 
     def _raise_urgency(self, urgency: Urgency) -> None:
         self._urgency = max(self._urgency, urgency)

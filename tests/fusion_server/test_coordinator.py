@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from mapweave import se2
 from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters, Draft
 from mapweave_protocol.codec import encode
@@ -252,3 +253,24 @@ def test_robots_beyond_the_limit_are_not_heard(
     assert not coordinator.receive_map(c)
     assert not coordinator.receive_alignments(make_alignments(a, c))
     assert coordinator.receive_alignments(make_alignments(a, b))
+
+
+def test_an_alignment_moves_with_the_submap_it_was_found_on(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    """Robot b corrects its map after it was compared; until it is compared again, this holds."""
+    coordinator = _coordinator()
+    a, b = make_map("a"), make_map("b", 1)
+    coordinator.receive_map(a)
+    coordinator.receive_map(b)
+    coordinator.receive_alignments(make_alignments(a, b, transform=(4.0, 0.0, 0.0)))
+    correction = np.array([0.5, -0.3, 0.2])
+    later = RobotMap("b", "first", 2, tuple(replace(s, pose=correction) for s in b.submaps))
+    coordinator.receive_map(later)
+    (alignment,) = _make_version(coordinator).alignments
+    np.testing.assert_allclose(
+        se2.compose(alignment.transform, correction), [4.0, 0.0, 0.0], atol=1e-9
+    )
+    coordinator.receive_alignments(make_alignments(a, later, transform=(4.1, 0.0, 0.0)))
+    (alignment,) = _make_version(coordinator).alignments
+    np.testing.assert_array_equal(alignment.transform, [4.1, 0.0, 0.0])

@@ -1,0 +1,81 @@
+"""An alignment found between earlier states of two robot maps, carried over to their present ones.
+
+An alignment says how two components lie to each other; what was compared are walls in their
+submaps. When a robot corrects its map, by a loop that it closes, the submaps move within the
+component. What they have in common moves with them, so the alignment is kept there.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.maps import Alignment, RobotMap, Submap
+
+
+class SubmapPlace(NamedTuple):
+    """Where a submap was: (3,) `pose` [m, m, rad] in component number `component`."""
+
+    component: int
+    pose: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Change:
+    """What became of a robot map: where its submaps were `then`, by id, and the map `now`."""
+
+    then: Mapping[int, SubmapPlace]
+    now: RobotMap
+
+
+def places_of(robot_map: RobotMap) -> dict[int, SubmapPlace]:
+    """Return where each submap is, by its id."""
+    return {s.id: SubmapPlace(s.component, s.pose) for s in robot_map.submaps}
+
+
+def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
+    """Return `alignment`, found between the maps as they were then, for the maps as they are now.
+
+    It holds on to the two submaps that it brings nearest to each other.
+    """
+    ours = _kept(reference, alignment.reference)
+    theirs = _kept(other, alignment.other)
+    if not ours or not theirs:
+        return alignment
+    here = np.array([_middle(s, reference) for s in ours])
+    there = se2.transform_points(alignment.transform, np.array([_middle(s, other) for s in theirs]))
+    apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
+    i, j = np.unravel_index(np.argmin(apart), apart.shape)
+    first, second = _motion(ours[i], reference), _motion(theirs[j], other)
+    if not (first.any() or second.any()):
+        return alignment
+    moved = se2.compose(first, se2.compose(alignment.transform, se2.inverse(second)))
+    return replace(alignment, transform=moved)
+
+
+def _kept(change: Change, component: str) -> list[Submap]:
+    """Return the submaps that are in this component now and were then."""
+    number = int(component.rsplit("/", 1)[1])
+    return [
+        s
+        for s in change.now.submaps
+        if s.component == number and s.id in change.then and change.then[s.id].component == number
+    ]
+
+
+def _middle(submap: Submap, change: Change) -> FloatArray:
+    """(2,) middle of a submap's wall [m], where it was then in its component."""
+    ends = submap.map.segments.reshape(-1, 2)
+    middle = ends.mean(axis=0) if len(ends) else np.zeros(2)
+    return se2.transform_points(change.then[submap.id].pose, middle)
+
+
+def _motion(submap: Submap, change: Change) -> FloatArray:
+    """(3,) by which a submap has moved in its component's frame since then; zeros if not at all."""
+    before = change.then[submap.id].pose
+    if np.array_equal(before, submap.pose):
+        return np.zeros(3)
+    return se2.compose(submap.pose, se2.inverse(before))
