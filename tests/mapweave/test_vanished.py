@@ -6,6 +6,8 @@ from numpy.random import Generator
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
+from mapweave.assembly import assemble
+from mapweave.mapper import Mapper
 from mapweave.maps import LineMap
 from mapweave.segments import extract_segments
 from mapweave.submap import GrowingSubmap, SubmapParameters
@@ -43,6 +45,20 @@ def test_a_person_who_stood_there_for_a_while_and_left_is_not_in_the_map(rng: Ge
     stays, leaves = np.vstack([ROOM, PERSON]), ROOM
     assert len(on_the_person(grown([stays] * 8, rng)))
     assert len(on_the_person(grown([stays] * 8 + [leaves] * 12, rng))) == 0
+
+
+def test_a_person_who_crosses_the_room_leaves_no_trace_in_a_robots_map(rng: Generator) -> None:
+    mapper = Mapper("a")
+    poses = path(24)
+    for k, pose in enumerate(poses):
+        step = min(k, 10) * np.array([0.0, -0.25, 0.0, -0.25])
+        person = PERSON + step + [1.5, 1.0, 1.5, 1.0] if k <= 10 else np.empty((0, 4))
+        scan = cast(np.vstack([ROOM, person]), pose, index=k, angles=AROUND, noise=rng)
+        assert mapper.add(scan).placed
+    walls = se2.transform_segments(poses[0], assemble(mapper.finish(), 0).segments)
+    inside = (walls > 0.3).all(axis=1) & (walls < [7.7, 4.7, 7.7, 4.7]).all(axis=1)
+    assert len(walls) >= 4
+    assert not inside.any()
 
 
 def test_who_comes_and_stays_is_in_the_map(rng: Generator) -> None:
