@@ -37,8 +37,6 @@ def feature_peers(cv2: ModuleType) -> list[Peer]:
 
 
 def _feature_peer(cv2: ModuleType, name: str, detector: Any) -> Peer:  # noqa: ANN401 - OpenCV's
-    cv2.setNumThreads(1)  # as the others have it
-
     def prepare(view: View) -> Features:
         return Features(view.grid, cv2.detail.computeImageFeatures2(detector, view.grid.image))
 

@@ -10,7 +10,7 @@ from tests.benchmarks.tables import format_table
 
 GROUPS = (50.0, 30.0, 15.0, 0.0)  # [m] in common, at least; those of the issue
 JOINABLE = 15.0  # [m] in common from which on a pair that is not joined counts as missed
-HEAD = ["joined from", "50 m and more", "30 to 50 m", "15 to 30 m", "under 15 m"]
+HEAD = ["", "50 m and more", "30 to 50 m", "15 to 30 m", "under 15 m"]
 HEAD += ["wrong, one building", "wrong, across", "ms a pair"]
 
 
@@ -47,16 +47,20 @@ def tell(own: Sequence[Trial], peers: Sequence[tuple[float, Sequence[Trial]]]) -
     """Return the table: mapweave's trials, if any, and each peer's with its own threshold."""
     rows = [row("mapweave, its own decision", own, 0.0)] if own else []
     for threshold, trials in peers:
-        if not trials:
-            continue
-        name = trials[0].peer
-        rows.append(row(f"{name}, default {threshold:g}", trials, threshold))
-        for kind, best in (
-            ("none wrong", safe_threshold(trials)),
-            ("best F1", balanced_threshold(trials)),
-        ):
-            rows.append(row(f"{name}, {kind} {best:.3g}", trials, best))
+        rows += _rows(threshold, trials) if trials else []
     return "\n".join([format_table(HEAD, rows), NOTE])
+
+
+def _rows(threshold: float, trials: Sequence[Trial]) -> list[list[str]]:
+    """Return a peer's rows: at its default threshold and at its two best."""
+    safe, balanced = safe_threshold(trials), balanced_threshold(trials)
+    at = f"from {safe:.3g}" if math.isfinite(safe) else "at no threshold"
+    name = trials[0].peer
+    return [
+        row(f"{name}, default from {threshold:g}", trials, threshold),
+        row(f"{name}, none wrong {at}", trials, safe),
+        row(f"{name}, best F1 from {balanced:.3g}", trials, balanced),
+    ]
 
 
 NOTE = f"""\
