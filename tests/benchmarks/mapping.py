@@ -15,6 +15,7 @@ from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave.picture import draw_joint, draw_map
 from mapweave.scan import Scan
 from tests.benchmarks.calibration import within_two_sigma
+from tests.benchmarks.compactness import Compactness, compactness
 from tests.benchmarks.coverage import explained_share, returns_at
 from tests.benchmarks.logs import Log, find_logs, load_scans, load_truth
 from tests.benchmarks.runs import Run, map_scans
@@ -37,6 +38,7 @@ For comparison, mean relation errors of others, on all relations and with their 
   killian    graph mapping 0.050 m, scan matching 1.651 m; own 0.039 m"""
 HEAD = ["log", "scans", "placed", "largest", "comp.", "steps right", "ATE m", "explained"]
 HEAD += ["segments", "file kB", "ms/scan", "real time"]
+COMPACT_HEAD = ["log", "segments", "metres", "drawn twice", "slivers", "ends that meet"]
 TRUST_HEAD = ["log", "false meetings", "within 2 sigma: along", "across", "turn"]
 RELATION_HEAD = ["log", "joined", "used", "mean m", "sd m", "mean °", "sd °"]
 
@@ -55,8 +57,10 @@ class Figures:
         [m] rms of the largest component, moved rigidly.
     explained
         Share of the returns under 12 m of the largest component within 10 cm of its lines.
-    segments, size
-        Of the largest component, merged; and the whole MAP.json [bytes].
+    compactness
+        Of the largest component, merged.
+    size
+        [bytes] of the whole MAP.json.
     scan_time
         [s] per scan, on a machine that may have been busy.
     duration
@@ -78,7 +82,7 @@ class Figures:
     steps_right: int
     position_error: float
     explained: float
-    segments: int
+    compactness: Compactness
     size: int
     scan_time: float
     duration: float
@@ -133,7 +137,7 @@ def _figures(log: Log, scans: Sequence[Scan], made: Run, merged: JointMap, size:
         steps_right=int(right.sum()),
         position_error=position_error(found[0], truth),
         explained=_explained(found[0], scans, lines),
-        segments=len(lines),
+        compactness=compactness(lines),
         size=size,
         scan_time=made.seconds / len(scans),
         duration=float(np.ptp(stamps)),
@@ -167,6 +171,7 @@ def tell(figures: Sequence[Figures]) -> str:
     """Return the tables as text."""
     related = [_relation_row(f.log, f.relations) for f in figures if f.relations]
     parts = [format_table(HEAD, [_row(f) for f in figures])]
+    parts += ["\nThe merged lines:", format_table(COMPACT_HEAD, [_compact_row(f) for f in figures])]
     parts += ["\nPlaces taken for one another, and how well determined poses were said to be:"]
     parts += [format_table(TRUST_HEAD, [_trust_row(f) for f in figures])]
     if related:
@@ -185,11 +190,17 @@ def _row(f: Figures) -> list[str]:
         f"{f.steps_right / max(f.steps, 1):.2%} of {f.steps}",
         f"{f.position_error:.3f}",
         f"{f.explained:.1%}",
-        str(f.segments),
+        str(f.compactness.segments),
         f"{f.size / 1000:.0f}",
         f"{1000 * f.scan_time:.1f}",
         f"{f.duration / (f.scan_time * f.scans):.0f}x",
     ]
+
+
+def _compact_row(f: Figures) -> list[str]:
+    c = f.compactness
+    counts = [str(c.segments), f"{c.length:.0f}", f"{c.doubled:.1%}", str(c.slivers)]
+    return [f.log, *counts, f"{c.meeting:.1%}"]
 
 
 def _trust_row(f: Figures) -> list[str]:
