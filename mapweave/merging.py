@@ -9,11 +9,14 @@ import heapq
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from mapweave.arrays import FloatArray, IntArray
 from mapweave.merging_cost import Pairs
 from mapweave.pairing import MergingParameters, Pairing
 from mapweave.segment_grid import SegmentGrid
+
+_ROUNDING = 1e-9  # [m] that distances computed in two ways may differ by
 
 __all__ = ["Evolution", "MergingParameters", "count_support", "evolve", "merge_scan"]
 
@@ -149,6 +152,22 @@ class _Evolving:
         if np.isfinite(costs[best]):
             heapq.heappush(self._queue, (float(costs[best]), number, int(older[best])))
 
+    def look_for_partners(self, first: int) -> None:
+        """Queue the segments from `first` on as `look_for_partner` would, all at once."""
+        lines = shapely.linestrings(self._segments[: len(self._parent)].reshape(-1, 2, 2))
+        near = shapely.STRtree(lines).query(
+            lines[first:], predicate="dwithin", distance=self._pairing.reach + _ROUNDING
+        )
+        number, other = near[0] + first, near[1]
+        older = other < number
+        number, other = number[older], other[older]
+        costs = self._pairing.cost(self._pairs(number, other))
+        order = np.lexsort([other, costs, number])
+        order = order[np.isfinite(costs[order])]
+        _, best = np.unique(number[order], return_index=True)
+        for k in order[best].tolist():
+            heapq.heappush(self._queue, (float(costs[k]), int(number[k]), int(other[k])))
+
     def run(self) -> None:
         """Merge the cheapest pair until the queue is empty."""
         while self._queue:
@@ -183,9 +202,9 @@ class _Evolving:
         self.add(merged, float(weight))
         self.look_for_partner(number)
 
-    def _pairs(self, number: int, others: IntArray) -> Pairs:
+    def _pairs(self, number: int | IntArray, others: IntArray) -> Pairs:
         return Pairs.of(
-            self._segments[number : number + 1],
+            np.atleast_2d(self._segments[number]),
             self._segments[others],
             self._weights[number],
             self._weights[others],
@@ -197,10 +216,9 @@ def _simplify(
 ) -> Evolution:
     """Merge the cheapest pair until none is left; not two of the `settled` first segments."""
     evolving = _Evolving(len(segments), pairing)
-    for number, (segment, weight) in enumerate(zip(segments, weights, strict=True)):
+    for segment, weight in zip(segments, weights, strict=True):
         evolving.add(segment, float(weight))
-        if number >= settled:
-            evolving.look_for_partner(number)
+    evolving.look_for_partners(settled)
     evolving.run()
     return evolving.result()
 

@@ -18,7 +18,7 @@ class PlacementParameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     tolerance: float = Field(
-        0.08, gt=0, description="[m] to either side, what is of the segment's surface"
+        0.09, gt=0, description="[m] to either side, what is of the segment's surface"
     )
     shadow: float = Field(0.3, gt=0, description="[m] to either side, where it might be instead")
     parallel: float = Field(

@@ -22,7 +22,7 @@ class SelectionParameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     tolerance: float = Field(
-        0.08, gt=0, description="[m] within which a segment explains what was seen"
+        0.09, gt=0, description="[m] within which a segment explains what was seen"
     )
     min_cosine: float = Field(
         -0.5,
@@ -38,7 +38,7 @@ class SelectionParameters(BaseModel):
         np.deg2rad(20.0), gt=0, description="[rad] within which faces are the same in its shadow"
     )
     price: float = Field(
-        0.1,
+        0.085,
         ge=0,
         description="[m] of wall, seen as often as the map's wall is on average, that a segment"
         " must explain beyond what the others do",
