@@ -36,7 +36,7 @@ class GraphParameters(BaseModel):
     )
     joining_sigma: float = Field(0.1, gt=0, description="[m] of components joined by their shapes")
     joining_turn: float = Field(0.01, gt=0, description="[rad] of components joined")
-    reach: int = Field(120, ge=2, description="submaps that a closure moves, the fewest links away")
+    reach: int = Field(80, ge=2, description="submaps that a closure moves, the fewest links away")
     long_loop: int = Field(
         40, ge=1, description="links round a loop from which on all submaps are moved"
     )

@@ -1,6 +1,6 @@
 """The mapper follows a robot from its scans alone, notices when it is lost, and finds it again."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,10 @@ from mapweave.assembly import assemble
 from mapweave.errors import InvalidIdError
 from mapweave.files import write_map
 from mapweave.mapper import Mapper, Placement
-from mapweave.maps import RobotMap
+from mapweave.maps import RobotMap, Submap
 from mapweave.readers import read_reference_poses, read_scans
 from mapweave.scan import Scan
+from mapweave.settling import Finished, Settled
 from tests.mapweave.buildings import (
     BUILDING,
     FRONT,
@@ -220,6 +221,39 @@ def test_a_map_can_be_taken_while_it_grows_and_its_version_grows_with_it(rng: Ge
         versions.append(so_far.version)
     assert (so_far.robot, so_far.boot) == ("a", "second")
     assert (np.diff(versions) > 0).all()
+
+
+class JoinsAll:
+    """Settles every submap by joining it to component 0, where it is."""
+
+    def __init__(self) -> None:
+        self._submaps: list[Submap] = []
+
+    def begin(self, finished: Finished) -> None:
+        """Take the next submap."""
+        self._submaps.append(replace(finished.submap, component=0))
+
+    def take(self) -> Settled:
+        """Return where all are."""
+        poses = np.array([s.pose for s in self._submaps])
+        return Settled(np.zeros(len(poses), dtype=np.int64), poses, self._submaps[-1])
+
+
+def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> None:
+    """Who remembers what was said of component 1 never takes another place for it."""
+    mapper = Mapper("a", settling=JoinsAll())
+    numbers = []
+    places = [(BUILDING, (1, 1), (5, 1)), (OTHER_BUILDING, (5, 1.5), (9, 1.5))] * 2
+    for visit, (outline, start, end) in enumerate(places):
+        scans, _ = scans_along(outline, [start, end], visit)
+        said = [
+            mapper.add(Scan(100 * visit + k, s.stamp, s.angles, s.ranges))
+            for k, s in enumerate(scans)
+        ]
+        numbers += [p.component for p in said if p.lost]
+    assert len(numbers) >= 2
+    assert numbers == sorted(set(numbers))
+    assert mapper.finish().components == [0]
 
 
 def test_a_mapper_needs_a_valid_robot_id() -> None:

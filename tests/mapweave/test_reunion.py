@@ -65,3 +65,32 @@ def test_one_component_is_left_as_it_is(parts: list[LineMap]) -> None:
 
 def test_no_submaps_are_no_components() -> None:
     assert Reunion(P).reunite([]) == ([], [])
+
+
+def test_a_pair_that_was_refused_is_compared_again_when_it_has_grown(
+    parts: list[LineMap], rng: Generator
+) -> None:
+    small = shaken(part(BUILDING, 10, 11), rng)
+    reunion = Reunion(P)
+    first, little = submap(0, 0, np.zeros(3), parts[0]), submap(1, 1, random_pose(rng), small)
+    assert reunion.reunite([first, little]) == ([first, little], [])
+    grown = submap(1, 1, little.pose, part(BUILDING, 4, 12))
+    joined, joints = reunion.reunite([first, grown])
+    assert joints == [(0, 1)]
+    assert [s.component for s in joined] == [0, 0]
+
+
+def test_a_pair_that_was_refused_is_not_compared_again_before_it_has_grown(
+    parts: list[LineMap], rng: Generator
+) -> None:
+    """Each comparison takes as long as it takes; a robot with many components makes many."""
+    elsewhere = part(OTHER_BUILDING, 0, 26)
+    first, other = (
+        submap(0, 0, np.zeros(3), parts[0]),
+        submap(1, 1, random_pose(rng), elsewhere),
+    )
+    reunion = Reunion(P)
+    assert reunion.reunite([first, other])[1] == []
+    alike = submap(1, 1, other.pose, part(BUILDING, 4, 12))
+    assert Reunion(P).reunite([first, alike])[1] == [(0, 1)]
+    assert reunion.reunite([first, alike])[1] == []
