@@ -14,6 +14,7 @@ from tests.benchmarks import (
     kidnap,
     mapping,
     peers,
+    team,
     wire,
 )
 
@@ -37,6 +38,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "endurance": endurance,
     "fusion": fusion,
     "peers": peers,
+    "team": team,
     "confidence": fit_confidence,
     "wire": wire,
 }
