@@ -20,7 +20,7 @@ from mapweave.explanations import ExplanationParameters, bits, explain
 from mapweave.map_raster import MapRaster
 from mapweave.maps import Alignment
 from mapweave.pose_graph import Link, optimise
-from mapweave.reliance import component_confidence, rely
+from mapweave.reliance import component_confidence, part_right, rely
 
 SET_ASIDE = "set aside: "  # begins the reason of an accepted alignment that is not relied on
 REASON_LENGTH = 500  # characters, as many as a message carries
@@ -66,7 +66,8 @@ def cluster_components(
 ) -> tuple[list[Cluster], tuple[Alignment, ...]]:
     """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
 
-    Alignments that name components not in `names` are left out.
+    What contradictions leave of an alignment's confidence is given with it. Alignments that name
+    components not in `names` are left out.
 
     Parameters
     ----------
@@ -124,12 +125,15 @@ class _Graph:
         ]
 
     def judge(self, alignment: Alignment) -> Alignment:
-        """Return `alignment`, ambiguous if it was accepted and is not relied on."""
+        """Return `alignment`: less sure if others contradict it, and ambiguous if set aside."""
         edge = self._edge_of.get(id(alignment))
-        if edge is None or edge in self._right:
+        if edge is None:
             return alignment
-        reason = f"{SET_ASIDE}{self._objection(edge)}; {alignment.reason}"
-        return replace(alignment, decision="ambiguous", reason=shortened(reason))
+        sure = min(alignment.confidence, part_right(edge, self._explanations))
+        if edge not in self._right:
+            reason = shortened(f"{SET_ASIDE}{self._objection(edge)}; {alignment.reason}")
+            return replace(alignment, decision="ambiguous", confidence=sure, reason=reason)
+        return alignment if sure == alignment.confidence else replace(alignment, confidence=sure)
 
     def _objection(self, k: int) -> str:
         """What speaks against edge `k`, in words."""

@@ -28,7 +28,7 @@ def rely(count: int, edges: Sequence[Edge], explanations: Sequence[Explanation])
             return frozenset(right)
         for group in doubtful:
             inside = [k for k in right if edges[k].first in group]
-            right.remove(min(inside, key=lambda k: (_part_right(k, explanations), k)))
+            right.remove(min(inside, key=lambda k: (part_right(k, explanations), k)))
 
 
 def component_confidence(
@@ -76,7 +76,8 @@ def _share(
     return sum(holding) / sum(e.weight for e in explanations)
 
 
-def _part_right(edge: int, explanations: Sequence[Explanation]) -> float:
+def part_right(edge: int, explanations: Sequence[Explanation]) -> float:
+    """Return in what part of all explanations, as probable as they are, `edge` is right."""
     weights = [e.weight for e in explanations if edge in e.right]
     return sum(weights) / sum(e.weight for e in explanations)
 
