@@ -147,15 +147,22 @@ class _Graph:
                 f"{np.hypot(off[0], off[1]):.1f} m and {np.degrees(abs(off[2])):.0f}° off what"
                 f" {_enumerate(others)} {'say' if len(others) > 1 else 'says'}"
             )
-        before = {(w.first, w.second) for w in self._doubts.against(present)}
-        news = [
-            witness
-            for witness in self._doubts.against(sorted([*present, k]))
-            if (witness.first, witness.second) not in before
-        ]
-        if news:
-            return self._tell_witness(max(news, key=lambda witness: witness.doubt))
+        alone = self._witness_against(k, [*present, k])
+        if alone:
+            return self._tell_witness(alone)
+        together = self._witness_against(k, range(len(self._edges)))
+        if together:
+            return f"{self._tell_witness(together)}, by this alignment or another one between them"
         return "contradicts others, and nothing tells for sure which is wrong"
+
+    def _witness_against(self, k: int, present: Sequence[int]) -> Witness | None:
+        """Who speaks most against those joined by way of edge `k`, with the edges `present`."""
+        found = []
+        for witness in self._doubts.against(sorted(present)):
+            _, paths = poses_along(witness.first, len(self._names), self._edges, sorted(present))
+            if paths[witness.second] >> k & 1:
+                found.append(witness)
+        return max(found, key=lambda witness: witness.doubt, default=None)
 
     def _tell_witness(self, witness: Witness) -> str:
         first, second = self._names[witness.first], self._names[witness.second]

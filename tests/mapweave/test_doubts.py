@@ -49,6 +49,10 @@ def test_walls_where_a_third_robot_saw_through_part_the_weakest_link_between() -
 def test_two_links_as_sure_as_each_other_are_both_parted() -> None:
     joint = joined_by_way_of_the_middle(ELSEWHERE, left=0.9, right=0.9)
     assert [list(c.robots) for c in joint.components] == [["a/0"], ["b/0"], ["c/0"]]
+    for alignment in joint.alignments:
+        assert alignment.reason.startswith("set aside: a/0 and c/0 would have ")
+        assert "by this alignment or another one between them" in alignment.reason
+        assert alignment.confidence == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_little_contradiction_makes_less_sure_and_parts_nothing() -> None:
