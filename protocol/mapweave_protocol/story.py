@@ -103,9 +103,8 @@ class Story:
             self._objections.pop(pair, None)
         elif self._objections.get(pair, -1) != found.revoked:
             self._objections[pair] = found.revoked
-            undone = f"joined no longer, since version {found.revoked}"
-            what = undone if found.revoked else "not relied on"
-            yield f"{pair[0]} and {pair[1]}: {what} ({found.reason})"
+            what = f"revoked in version {found.revoked}" if found.revoked else "not relied on"
+            yield f"{pair[0]} and {pair[1]}: alignment {what} ({found.reason})"
 
     def _robot(self, robot: str) -> RobotState:
         return self.robots.setdefault(robot, RobotState())

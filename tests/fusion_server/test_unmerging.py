@@ -109,7 +109,7 @@ def test_a_pair_compared_again_and_refused_comes_apart_and_the_version_says_why(
     assert lines == [
         "joint map 1: a/0 + b/0 (90%)",
         "joint map 2: a/0, b/0",
-        "a/0 and b/0: joined no longer, since version 2 (only 3 m of wall in common)",
+        "a/0 and b/0: alignment revoked in version 2 (only 3 m of wall in common)",
     ]
 
 

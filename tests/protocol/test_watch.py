@@ -118,8 +118,8 @@ def test_a_join_that_a_version_does_not_rely_on_is_told_once_with_the_reason() -
         if not line.startswith("joint map")
     ]
     assert lines == [
-        "a/0 and b/0: not relied on (9 m off what a/0-c/0 says)",
-        "a/0 and b/0: joined no longer, since version 3 (only 2 m)",
+        "a/0 and b/0: alignment not relied on (9 m off what a/0-c/0 says)",
+        "a/0 and b/0: alignment revoked in version 3 (only 2 m)",
     ]
 
 
