@@ -178,6 +178,8 @@ class _Graph:
 
     def _poses(self, group: Sequence[int]) -> dict[str, FloatArray]:
         """Poses of the components of `group`, the first in its own frame."""
+        if len(group) == 1:
+            return {self._names[group[0]]: np.zeros(3)}
         inside = [k for k in sorted(self._right) if self._edges[k].first in group]
         poses, _ = poses_along(group[0], len(self._names), self._edges, inside)
         fitted = poses[list(group)]

@@ -1,6 +1,6 @@
 """The weakest cut: what must be wrong for two parts of a graph to lie wrongly to each other."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,39 +43,47 @@ def groups(count: int, edges: Sequence[Edge], present: Iterable[int]) -> list[li
 
 
 def weakest_cut(
-    count: int, edges: Sequence[Edge], strengths: dict[int, float], first: int, second: int
+    nodes: Sequence[int],
+    edges: Sequence[Edge],
+    strengths: dict[int, float],
+    first: int,
+    second: int,
 ) -> Cut:
-    """Return the weakest cut between two nodes: by maximum flow (Ford and Fulkerson 1956).
+    """Return the weakest cut between two of `nodes`: by maximum flow (Ford and Fulkerson 1956).
 
     Parameters
     ----------
     strengths
-        Of the edges that are there, by their numbers; 0 or more.
+        Of the edges between them, by their numbers; 0 or more.
     """
-    capacity = _capacities(count, edges, strengths)
-    flow = maximum_flow(capacity, first, second)
+    place = {node: k for k, node in enumerate(nodes)}
+    capacity = _capacities(place, edges, strengths)
+    flow = maximum_flow(capacity, place[first], place[second])
     left = capacity - flow.flow
     left.eliminate_zeros()
-    side = breadth_first_order(left, first, return_predecessors=False)
-    cut = Cut(0.0, frozenset(int(node) for node in side))
+    side = breadth_first_order(left, place[first], return_predecessors=False)
+    cut = Cut(0.0, frozenset(nodes[int(k)] for k in side))
     crossing = (v for k, v in strengths.items() if cut.parts(edges[k].first, edges[k].second))
     return Cut(sum(crossing), cut.side)
 
 
 def weakest_cut_of_all(
-    nodes: Sequence[int], count: int, edges: Sequence[Edge], strengths: dict[int, float]
+    nodes: Sequence[int], edges: Sequence[Edge], strengths: dict[int, float]
 ) -> Cut:
     """Return the weakest of all cuts that part `nodes`, of which there are two or more."""
     first, *others = nodes
-    cuts = [weakest_cut(count, edges, strengths, first, other) for other in others]
+    cuts = [weakest_cut(nodes, edges, strengths, first, other) for other in others]
     return min(cuts, key=lambda cut: cut.strength)
 
 
-def _capacities(count: int, edges: Sequence[Edge], strengths: dict[int, float]) -> csr_array:
-    """(count, count) how much flows from node to node, alike both ways."""
-    table: IntArray = np.zeros((count, count), dtype=np.int64)
+def _capacities(
+    place: Mapping[int, int], edges: Sequence[Edge], strengths: dict[int, float]
+) -> csr_array:
+    """(n, n) how much flows from node to node, alike both ways."""
+    table: IntArray = np.zeros((len(place), len(place)), dtype=np.int64)
     for k, strength in strengths.items():
         units = min(max(round(strength * UNITS), 1), MAX_UNITS)
-        table[edges[k].first, edges[k].second] += units
-        table[edges[k].second, edges[k].first] += units
+        first, second = place[edges[k].first], place[edges[k].second]
+        table[first, second] += units
+        table[second, first] += units
     return csr_array(np.minimum(table, 2**30).astype(np.int32))

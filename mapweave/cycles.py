@@ -58,7 +58,7 @@ def bad_cycles(count: int, edges: Sequence[Edge], removed: int, p: CycleParamete
     """
     present = [k for k in range(len(edges)) if not removed >> k & 1]
     found: set[int] = set()
-    for root in range(count):
+    for root in sorted({edges[k].first for k in present} | {edges[k].second for k in present}):
         found.update(bad_cycles_through(root, count, edges, present, p))
     return sorted(found, key=lambda mask: (mask.bit_count(), mask))[: p.max_cycles]
 

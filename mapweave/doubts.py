@@ -123,6 +123,8 @@ class MapDoubts:
         """Return all that speaks against the edges `present`."""
         found = []
         for group in groups(self._count, self._edges, present):
+            if len(group) == 1:
+                continue
             poses, _ = poses_along(group[0], self._count, self._edges, present)
             for a, b in combinations(group, 2):
                 found.append(self._witnesses.ask(a, b, se2.between(poses[a], poses[b])))

@@ -53,7 +53,7 @@ def component_confidence(
         for k in right
         if edges[k].first in group
     }
-    cut = weakest_cut_of_all(group, count, edges, strengths)
+    cut = weakest_cut_of_all(group, edges, strengths)
     share = _share(group, count, edges, right, explanations)
     against = (1 - share) / share + math.exp(parameters.cycle_gain - cut.strength)
     return 1 / (1 + against)

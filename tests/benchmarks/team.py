@@ -141,7 +141,7 @@ def is_held_twice(cluster: Cluster, judged: Sequence[Alignment], false: Alignmen
     ]
     each = dict.fromkeys(range(len(edges)), 1.0)
     ends = number[false.reference], number[false.other]
-    return weakest_cut(len(number), edges, each, *ends).strength >= 2
+    return weakest_cut(range(len(number)), edges, each, *ends).strength >= 2
 
 
 def _holds(team: Team, cluster: Cluster, false: Alignment) -> bool:
