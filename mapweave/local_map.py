@@ -33,6 +33,16 @@ class LocalMapParameters(BaseModel):
     overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
     clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
     sight: float = Field(12.0, gt=0, description="[m] up to which seeing through counts")
+    far_sight: float = Field(
+        25.0, gt=0, description="[m] the same for a surface that faces the sensor: a corridor's end"
+    )
+    facing: float = Field(
+        0.7,
+        gt=0,
+        lt=1,
+        description="cosine between a beam and the normal of a surface that faces it; far away,"
+        " a small turn moves a beam along such a surface, not before or behind it",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +72,12 @@ class Evidence:
     def score(self) -> float:
         """For minus against."""
         return self.explained - self.contradicted - self.seen_through
+
+    @property
+    def disputed(self) -> float:
+        """What speaks against, as a share of all that speaks."""
+        against = self.contradicted + self.seen_through
+        return against / max(self.explained + against, 1e-9)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,9 +146,10 @@ class LocalMap:
         p = self._parameters
         placed = join_surfaces([surface.moved(pose) for pose in poses])
         distance, _ = partners(placed, self.target, p.icp, p.overlap)
-        shape = (len(poses), len(surface))
-        explained = np.isfinite(distance).reshape(shape)
-        contradicted = ~explained & self._free_before(placed.points.reshape(*shape, 2), poses)
+        explained = np.isfinite(distance).reshape(len(poses), -1)
+        judged = _faced(surface, p) | (np.hypot(*surface.points.T) < p.sight)
+        free = self._free_before(placed.points.reshape(*explained.shape, 2), poses)
+        contradicted = ~explained & free & judged
         through = self._seen_through(scan, poses)
         shares = zip(explained.mean(axis=1), contradicted.mean(axis=1), through, strict=True)
         return [Evidence(float(e), float(c), float(t)) for e, c, t in shares]
@@ -140,16 +157,14 @@ class LocalMap:
     def _seen_through(self, scan: Scan, poses: FloatArray) -> FloatArray:
         """(k,) share of the known points in sight that `scan` saw through from each pose."""
         p = self._parameters
-        known = self.target.surface.points[::3]
-        middle = poses[:, :2].mean(axis=0)
-        spread = float(np.hypot(*(poses[:, :2] - middle).T).max())
-        known = known[np.hypot(*(known - middle).T) < p.sight + spread]
+        known = self.target.surface.at(slice(None, None, 3))
         shares = np.zeros(len(poses))
         for k, pose in enumerate(poses):
-            local = se2.transform_points(se2.inverse(pose), known)
-            in_sight = np.hypot(*local.T) < p.sight
-            if in_sight.any():
-                through = seen_through(scan, local[in_sight], p.clearance, p.sight)
+            local = known.moved(se2.inverse(pose))
+            near = np.hypot(*local.points.T) < p.sight
+            local = local.at(near | _faced(local, p))
+            if len(local):
+                through = seen_through(scan, local.points, p.clearance, p.far_sight)
                 shares[k] = through.mean()
         return shares
 
@@ -163,7 +178,7 @@ class LocalMap:
         for k in np.unique(asked):
             keyframe, of = self._keyframes[int(k)], (asked == k).any(axis=1)
             local = se2.transform_points(se2.inverse(keyframe.pose), points[of])
-            through = seen_through(keyframe.scan, local.reshape(-1, 2), p.clearance, p.sight)
+            through = seen_through(keyframe.scan, local.reshape(-1, 2), p.clearance, p.far_sight)
             free[of] |= through.reshape(local.shape[:2])
         return free
 
@@ -173,3 +188,10 @@ class LocalMap:
         x, y, turn = se2.between(self._keyframes[-1].pose, pose)
         p = self._parameters
         return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
+
+
+def _faced(surface: Surface, p: LocalMapParameters) -> BoolArray:
+    """(n,) which points of `surface`, sensor frame, face the sensor and are not too far."""
+    distance = np.maximum(np.hypot(*surface.points.T), 1e-9)
+    cosine = -np.einsum("ij,ij->i", surface.points, surface.normals) / distance
+    return np.asarray((cosine > p.facing) & (distance < p.far_sight))

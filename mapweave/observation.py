@@ -9,7 +9,7 @@ from mapweave.maps import LineMap
 from mapweave.polylines import group_polylines
 from mapweave.scan import Scan
 from mapweave.segments import ScanSegments, SegmentParameters, extract_segments
-from mapweave.surface import Surface, scan_surface
+from mapweave.surface import Surface, join_surfaces, scan_surface, surface_between
 
 
 class ObservationParameters(BaseModel):
@@ -19,6 +19,7 @@ class ObservationParameters(BaseModel):
 
     segments: SegmentParameters = SegmentParameters()
     max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
+    spacing: float = Field(0.2, gt=0, description="[m] between points on walls, at the most")
     sight: float = Field(
         25.0,
         gt=0,
@@ -38,12 +39,15 @@ class Observation:
     lines
         Its segments as generalized polylines (paper, V).
     surface
-        Its oriented points, each knowing its polyline.
+        The oriented points of its returns, each knowing its polyline.
+    walls
+        The same with points between them where they lie on one segment: what to remember.
     """
 
     scan: Scan
     lines: LineMap
     surface: Surface
+    walls: Surface
 
 
 def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
@@ -55,4 +59,6 @@ def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     ordered = ScanSegments(found.segments[order], label)
     support = np.ones(len(order), dtype=np.int64)
     lines = LineMap(ordered.segments, polyline, support)
-    return Observation(scan, lines, scan_surface(scan, ordered, polyline, parameters.sight))
+    surface = scan_surface(scan, ordered, polyline, parameters.sight)
+    between = surface_between(scan, ordered, polyline, parameters.sight, parameters.spacing)
+    return Observation(scan, lines, surface, join_surfaces([surface, between]))

@@ -91,6 +91,36 @@ def scan_surface(
     return Surface(points[oriented], left_normals(directions[oriented]), of_polyline[oriented])
 
 
+def surface_between(
+    scan: Scan, segments: ScanSegments, polyline: IntArray, max_range: float, spacing: float
+) -> Surface:
+    """Return oriented points between the returns of `scan` on each segment, sensor frame.
+
+    Far along a wall the returns are metres apart. Were they all that is remembered of it, a later
+    scan would fit best where its returns fall on the same places again: where nothing moved.
+
+    Parameters
+    ----------
+    polyline
+        (n,) the generalized polyline of each of the n segments.
+    spacing
+        [m] that two neighbouring points are apart at the most, returns included.
+    """
+    with np.errstate(invalid="ignore"):
+        used = np.flatnonzero((segments.label >= 0) & (scan.ranges <= max_range))
+    points, label = scan.points[used], segments.label[used]
+    step = np.diff(points, axis=0)
+    count = np.maximum(0, np.ceil(np.hypot(*step.T) / spacing).astype(np.int64) - 1)
+    count[label[1:] != label[:-1]] = 0
+    owner = np.repeat(np.arange(len(count)), count)
+    rank = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    fraction = (rank + 1) / (count[owner] + 1)
+    lines = segments.segments[label[owner]]
+    normals = left_normals(lines[:, 2:] - lines[:, :2])
+    between = points[owner] + fraction[:, None] * step[owner]
+    return Surface(between, normals, polyline[label[owner]])
+
+
 def line_surface(lines: LineMap, spacing: float) -> tuple[Surface, IntArray]:
     """Return oriented points about every `spacing` [m] along the segments of `lines`.
 

@@ -50,6 +50,12 @@ class TrackerParameters(BaseModel):
     convincing: float = Field(0.75, description="score above which no search is made")
     acceptable: float = Field(0.5, description="score above which a searched pose is taken")
     plausible: float = Field(0.25, description="score above which one without a rival is taken")
+    max_disputed: float = Field(
+        0.17,
+        gt=0,
+        lt=1,
+        description="of the evidence for a pose that does not convince, against it",
+    )
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
@@ -102,7 +108,7 @@ class Tracker:
         self._motion = se2.between(self.pose, tracked.pose)
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
-        self._local.remember(seen.scan, seen.surface, tracked.pose)
+        self._local.remember(seen.scan, seen.walls, tracked.pose)
         return tracked
 
     def is_blind(self, seen: Observation) -> bool:
@@ -138,10 +144,16 @@ class Tracker:
         for enough, starts in stages:
             found += [t for t in self._aligned(seen, starts()) if self._is_reached(t)]
             best = max(found, key=lambda t: self._value(t, predicted), default=None)
-            if best is not None and best.evidence.score >= enough:
+            if best is not None and self._is_enough(best.evidence, enough):
                 return self._slid(seen, best, predicted)
         taken = best is not None and self._followed and self._stands_out(best, found)
         return best if taken else None
+
+    def _is_enough(self, evidence: Evidence, score: float) -> bool:
+        """Whether a pose reaches `score`, and convinces or is hardly disputed."""
+        p = self.parameters
+        convinces = evidence.score >= p.convincing
+        return evidence.score >= score and (convinces or evidence.disputed <= p.max_disputed)
 
     def _predictions(self, scan: Scan) -> FloatArray:
         """(k, 3) where the robot may be by now: by its odometry, and at constant velocity."""
@@ -180,7 +192,7 @@ class Tracker:
         )
         rivals = [t.evidence.score for t, other in zip(found, different, strict=True) if other]
         margin = best.evidence.score - max(rivals, default=-1.0)
-        return best.evidence.score >= p.plausible and margin >= p.margin
+        return self._is_enough(best.evidence, p.plausible) and margin >= p.margin
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""

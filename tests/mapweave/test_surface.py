@@ -11,6 +11,7 @@ from tests.mapweave.buildings import (
     AROUND,
     BUILDING,
     cast,
+    corridor,
     line_map,
     random_pose,
     rectangle,
@@ -53,6 +54,18 @@ def test_every_return_up_to_the_range_becomes_a_point_and_no_other(rng: Generato
     near = (scan.ranges <= 6.0) & (segments.label >= 0)
     assert len(seen) >= near.sum()
     assert (seen.polyline >= 0).sum() == near.sum()
+
+
+def test_of_a_wall_that_was_seen_at_a_slant_no_part_is_left_out(rng: Generator) -> None:
+    """The returns along a corridor are metres apart; what is remembered of its walls is not."""
+    scan = cast(walls_of(corridor(60, [], [])), [10, 1.1, 0], noise=rng)
+    parameters = ObservationParameters()
+    seen = observe(scan, parameters)
+    right = seen.walls.at((seen.walls.normals[:, 1] > 0.9) & (seen.walls.points[:, 0] > 0))
+    along = np.sort(right.points[:, 0])
+    assert along[-1] - along[0] > 7
+    assert np.diff(along).max() <= parameters.spacing + 0.01
+    assert np.abs(right.points[:, 1] + 1.1).max() < 0.15
 
 
 def test_a_line_is_sampled_evenly_and_even_a_short_one_once() -> None:
