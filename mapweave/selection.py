@@ -38,7 +38,7 @@ class SelectionParameters(BaseModel):
         np.deg2rad(20.0), gt=0, description="[rad] within which faces are the same in its shadow"
     )
     price: float = Field(
-        0.085,
+        0.11,
         ge=0,
         description="[m] of wall, seen as often as the map's wall is on average, that a segment"
         " must explain beyond what the others do",

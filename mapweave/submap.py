@@ -11,6 +11,7 @@ from mapweave.arrays import FloatArray, IntArray
 from mapweave.free_space import FreeSpaceParameters, rings, scan_free_space, unite
 from mapweave.maps import LineMap, Trajectory
 from mapweave.merging import MergingParameters, count_support, merge_scan
+from mapweave.placement import PlacementParameters
 from mapweave.polylines import group_polylines
 from mapweave.scan import Scan
 from mapweave.selection import SelectionParameters
@@ -37,7 +38,9 @@ class SubmapParameters(BaseModel):
     free_space: FreeSpaceParameters = FreeSpaceParameters()
     vanished: VanishedParameters = VanishedParameters()
     simplification: SimplificationParameters = SimplificationParameters(
-        selection=SelectionParameters(price=0.05)  # what is little here may be much together
+        # Poses err less here than among submaps; and what is little here may be much together.
+        placement=PlacementParameters(tolerance=0.07),
+        selection=SelectionParameters(tolerance=0.07, price=0.03),
     )
 
 
