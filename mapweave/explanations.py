@@ -221,7 +221,17 @@ class _Search:
             root = self._edges[k].first
             if not bad_cycles_through(root, self._count, self._edges, present, self._p.cycles):
                 removed &= ~(1 << k)
-        return _Candidate(self._cost(removed), removed)
+        return self._remove_doubted(removed)
+
+    def _remove_doubted(self, removed: int) -> _Candidate:
+        """Remove the weakest of what is doubted most, as far as that is the more probable."""
+        tried = []
+        while True:
+            doubt, doubted = self._doubts(removed)
+            tried.append(_Candidate(self._cost(removed) + doubt, removed, doubt))
+            if not doubted:
+                return min(tried)
+            removed |= 1 << min(bits(doubted), key=lambda k: self._odds[k])
 
 
 def bits(mask: int) -> list[int]:

@@ -203,6 +203,22 @@ def test_too_many_contradictions_are_still_resolved_into_some_that_agree(rng: Ge
     assert groups(7, edges, found.right) == [list(range(7))]
 
 
+@pytest.mark.parametrize("tries", [1, P.max_tries])
+@pytest.mark.parametrize(("doubt", "right"), [(1.0, {0, 1, 2}), (3.0, {0, 2})])
+def test_what_is_doubted_goes_when_that_is_the_more_probable(
+    tries: int, doubt: float, right: set[int]
+) -> None:
+    """A chain of odds 19, 4 and 9, whose first two together are doubted: also without a search."""
+    poses = poses_of(4)
+    edges = [edge(poses, k, k + 1, c) for k, c in enumerate([0.95, 0.8, 0.9])]
+
+    def doubts(removed: int, /) -> tuple[float, int]:
+        return (0.0, 0) if removed & 3 else (doubt, 3)
+
+    p = P.model_copy(update={"max_tries": tries})
+    assert explain(4, edges, p, doubts)[0].right == right
+
+
 def test_errors_add_up_along_a_cycle_as_their_squares_do() -> None:
     p = CycleParameters()
     for count in (3, 12):
