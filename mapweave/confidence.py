@@ -18,11 +18,9 @@ class ConfidenceParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    intercept: float = Field(-20.9, description="log odds where all features are 0")
-    common: float = Field(1.34, description="for ln(1 + metres in common)")
-    overlap: float = Field(15.9, description="for the share in common")
-    held: float = Field(0.559, description="for ln(1 + metres that hold the weakest direction)")
-    margin: float = Field(1.18, description="for 1 - rival's score / score, in [0, 1]")
+    intercept: float = Field(-8.75, description="log odds where all features are 0")
+    score: float = Field(2.71, description="for ln(1 + metres in common less those contradicted)")
+    held: float = Field(1.75, description="for ln(1 + metres that hold the weakest direction)")
     rivalry: float = Field(
         12.0,
         gt=0,
@@ -32,16 +30,9 @@ class ConfidenceParameters(BaseModel):
     )
 
 
-def features(best: Verdict, rival: Verdict | None) -> FloatArray:
-    """Return (4,) what the model looks at: common, overlap, held, margin."""
-    return np.array(
-        [
-            np.log1p(max(best.common, 0.0)),
-            best.overlap,
-            np.log1p(max(best.held, 0.0)),
-            1.0 - _rivalry(best, rival) if best.score > 0 else 0.0,
-        ]
-    )
+def features(best: Verdict) -> FloatArray:
+    """Return (2,) what the model looks at: score and held."""
+    return np.log1p(np.maximum([best.score, best.held], 0.0))
 
 
 def share(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
@@ -56,8 +47,8 @@ def share(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters
 def confidence(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
     """Return the probability that the best hypothesis is right, in (0, 1)."""
     p = parameters
-    slopes = np.array([p.common, p.overlap, p.held, p.margin])
-    either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best, rival))))
+    slopes = np.array([p.score, p.held])
+    either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best))))
     return float(either * share(best, rival, p))
 
 

@@ -25,11 +25,11 @@ class CornerParameters(BaseModel):
     min_length: float = Field(0.4, gt=0, description="[m] of a wall, for a direction worth using")
     max_gap: float = Field(3.0, gt=0, description="[m] between the walls")
     min_angle: float = Field(0.6, gt=0, description="[rad] between them: 35°")
-    max_corners: int = Field(600, ge=1, description="of a map, the weightiest")
+    max_corners: int = Field(400, ge=1, description="of a map, the weightiest")
     angle_tolerance: float = Field(0.09, gt=0, description="[rad] between like corners: 5°")
     vote_cell: float = Field(0.4, gt=0, description="[m] within which proposals agree")
     vote_turn: float = Field(0.09, gt=0, description="[rad] within which they agree: 5°")
-    hypotheses: int = Field(600, ge=1, description="handed on, the most proposed")
+    hypotheses: int = Field(300, ge=1, description="handed on, the most proposed")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -108,6 +108,43 @@ def main_directions(
     return np.sort(np.mod(fine, LINE_PERIOD))
 
 
+def likely_turns(
+    reference: FloatArray, other: FloatArray, count: int, separation: float
+) -> FloatArray:
+    """Return the turns that make the walls of `other` parallel to those of `reference`.
+
+    Directed segments, so that half a turn is not the same: peaks of the circular correlation of
+    the two histograms.
+
+    Parameters
+    ----------
+    reference, other
+        (n, 4) and (m, 4) x1 y1 x2 y2 [m].
+    count
+        How many turns at most.
+    separation
+        [rad] between any two.
+
+    Returns
+    -------
+    FloatArray
+        (k,) [rad] in [-pi, pi), the likeliest first.
+    """
+    bins = 360
+    ours, theirs = (
+        np.fft.rfft(direction_histogram(segments, bins=bins, period=DIRECTED_PERIOD))
+        for segments in (reference, other)
+    )
+    likely = np.fft.irfft(ours * theirs.conj(), bins)
+    peaks = np.flatnonzero((likely >= np.roll(likely, 1)) & (likely > np.roll(likely, -1)))
+    kept: list[float] = []
+    for peak in peaks[np.argsort(-likely[peaks], kind="stable")]:
+        turn = float(np.mod(peak * DIRECTED_PERIOD / bins + np.pi, DIRECTED_PERIOD) - np.pi)
+        if all(np.cos(turn - other_turn) < np.cos(separation) for other_turn in kept):
+            kept.append(turn)
+    return np.array(kept[:count])
+
+
 def nearest_direction(angle: ArrayLike, directions: FloatArray, tolerance: float) -> FloatArray:
     """Return the direction of a line nearest to each angle, NaN where none is near.
 

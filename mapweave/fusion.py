@@ -16,7 +16,7 @@ from mapweave.arrays import FloatArray
 from mapweave.assembly import assemble
 from mapweave.confidence import ConfidenceParameters, confidence
 from mapweave.hypotheses import HypothesisParameters, Shape, different, hypothesise
-from mapweave.icp import IcpParameters, Target, align
+from mapweave.icp import IcpParameters, Target, align_all
 from mapweave.map_raster import RasterParameters
 from mapweave.maps import Alignment, Decision, LineMap, RobotMap, component_name
 from mapweave.verification import Verdict, VerificationParameters, shared_complexity, verify
@@ -32,15 +32,15 @@ class FusionParameters(BaseModel):
 
     raster: RasterParameters = RasterParameters()
     hypotheses: HypothesisParameters = HypothesisParameters()
-    verification: VerificationParameters = VerificationParameters()
-    coarse_icp: IcpParameters = IcpParameters(start_scale=0.5, end_scale=0.1)
-    fine_icp: IcpParameters = IcpParameters(start_scale=0.25, end_scale=0.06)
-    coarse_samples: int = Field(300, ge=10, description="of a map's walls, aligning hypotheses")
+    verification: VerificationParameters = VerificationParameters(contradiction_weight=5.0)
+    icp: IcpParameters = IcpParameters(start_scale=0.25, end_scale=0.1, shrink=0.6)
+    icp_samples: int = Field(250, ge=10, description="of a map's walls, aligning hypotheses")
+    loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
     confidence: ConfidenceParameters = ConfidenceParameters()
     min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
     min_common: float = Field(6.0, gt=0, description="[m] of wall in common")
     min_overlap: float = Field(
-        0.8, gt=0, le=1, description="of the wall that both looked at, the share in common"
+        0.9, gt=0, le=1, description="of the wall that both looked at, the share in common"
     )
     min_held: float = Field(
         2.5, gt=0, description="[m] of common wall across the weakest direction"
@@ -48,7 +48,7 @@ class FusionParameters(BaseModel):
     min_complexity: float = Field(
         0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
     )
-    min_confidence: float = Field(0.6, gt=0, lt=1, description="of an accepted alignment")
+    min_confidence: float = Field(0.8, gt=0, lt=1, description="of an accepted alignment")
     max_rival: float = Field(
         0.6, gt=0, lt=1, description="score of the best different hypothesis, as a share"
     )
@@ -136,44 +136,24 @@ def _compare(
 
 
 def find_alignments(first: Shape, second: Shape, p: FusionParameters) -> list[Hypothesis]:
-    """Return the best hypothesis and the best different one, where there are any."""
+    """Return the hypotheses that differ, best first; none where no shape proposes any."""
     transforms, _ = hypothesise(first, second, p.hypotheses, p.verification)
     if len(transforms) == 0:
         return []
-    target = Target.of(first.raster.surface, p.coarse_icp)
-    aligned = np.array(
-        [_refine(second, target, t, p.coarse_icp, p.coarse_samples) for t in transforms]
-    )
-    verdicts = [_verdict(first, second, t, p) for t in aligned]
-    scores = np.array([v.score for v in verdicts])
+    aligned = _refined(first, second, transforms, p)
+    verdicts = [verify(first.raster, second.raster, t, p.verification) for t in aligned]
     middle = second.raster.surface.points.mean(axis=0)
-    leaders = different(aligned, scores, middle, p.hypotheses)
-    found: list[Hypothesis] = []
-    for start in aligned[leaders]:
-        fine = _refine(second, target, start, p.fine_icp, len(second.raster.weight))
-        hypothesis = _judged(first, second, fine, middle, p)
-        # Two that ended in the same place are one, and not each other's rival.
-        if not found or _differ(found[0], hypothesis, p.hypotheses):
-            found.append(hypothesis)
-        if len(found) == 2:
-            break
-    return sorted(found, key=lambda h: -h.verdict.score)
-
-
-def _differ(one: Hypothesis, other: Hypothesis, p: HypothesisParameters) -> bool:
-    distance, turn = _difference(one, other)
-    return distance > p.distance or turn > p.turn
-
-
-def _judged(
-    first: Shape, second: Shape, transform: FloatArray, middle: FloatArray, p: FusionParameters
-) -> Hypothesis:
-    return Hypothesis(
-        transform,
-        se2.transform_points(transform, middle),
-        _verdict(first, second, transform, p),
-        _complexity(first, second, transform, p),
-    )
+    # Two that ended in the same place are one, and not each other's rival.
+    ranked = different(aligned, np.array([v.score for v in verdicts]), middle, p.hypotheses)
+    return [
+        Hypothesis(
+            aligned[k],
+            se2.transform_points(aligned[k], middle),
+            verdicts[k],
+            _complexity(first, second, aligned[k], p),
+        )
+        for k in ranked[:2]
+    ]
 
 
 def decide(
@@ -181,7 +161,7 @@ def decide(
 ) -> tuple[Decision, str]:
     """Return the decision and one sentence that gives the reason; `sure` is the confidence."""
     v = best.verdict
-    found = f"{v.common:.0f} m of wall in common, {v.contradicted:.1f} m contradicted"
+    found = _tell(v)
     if v.common < p.min_common:
         return "refused", f"only {v.common:.1f} m of wall in common"
     if v.overlap < p.min_overlap:
@@ -195,20 +175,23 @@ def decide(
     if best.complexity < p.min_complexity:
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
     if rival is not None and rival.verdict.score > p.max_rival * v.score:
-        elsewhere = _elsewhere(best, rival)
-        return "ambiguous", f"{found}; but {elsewhere} explains {rival.verdict.score:.0f} m as well"
+        as_well = f"fits as well, with {_tell(rival.verdict)}"
+        return "ambiguous", f"{found}; but {_elsewhere(best, rival)} {as_well}"
+    next_best = _next_best(best, rival)
     if sure < p.min_confidence:
-        return "ambiguous", f"{found}; too little to be sure ({sure:.0%})"
-    if rival is None:
-        return "accepted", f"{found}; nothing else fits"
-    return (
-        "accepted",
-        f"{found}; next best, {_elsewhere(best, rival)}, explains {_explains(rival.verdict)}",
-    )
+        return "ambiguous", f"{found}; {next_best}; too little to be sure ({sure:.0%})"
+    return "accepted", f"{found}; {next_best}"
 
 
-def _explains(verdict: Verdict) -> str:
-    return f"{verdict.score:.0f} m" if verdict.score >= 1 else "nothing"
+def _tell(verdict: Verdict) -> str:
+    return f"{verdict.common:.0f} m of wall in common, {verdict.contradicted:.1f} m contradicted"
+
+
+def _next_best(best: Hypothesis, rival: Hypothesis | None) -> str:
+    """The rival and what speaks for and against it, in words."""
+    if rival is None or rival.verdict.common < 1:
+        return "nothing else fits"
+    return f"next best, {_elsewhere(best, rival)}, has {_tell(rival.verdict)}"
 
 
 def _elsewhere(best: Hypothesis, rival: Hypothesis) -> str:
@@ -225,21 +208,24 @@ def _difference(best: Hypothesis, rival: Hypothesis) -> tuple[float, float]:
     return float(np.hypot(x, y)), float(abs(turn))
 
 
-def _refine(
-    other: Shape, target: Target, start: FloatArray, icp: IcpParameters, samples: int
-) -> FloatArray:
-    """Align the walls of `other` to `target` (V1), from at most about `samples` points."""
-    surface = other.raster.surface
-    stride = max(1, len(surface) // samples)
-    return align(surface.at(slice(None, None, stride)), target, start, icp).pose
-
-
-def _verdict(first: Shape, second: Shape, transform: FloatArray, p: FusionParameters) -> Verdict:
-    return verify(first.raster, second.raster, transform, p.verification)
+def _refined(first: Shape, second: Shape, starts: FloatArray, p: FusionParameters) -> FloatArray:
+    """Align the walls of `second` to those of `first` (V1) from each of (k, 3) `starts`."""
+    surface = second.raster.surface
+    stride = 1 + (len(surface) - 1) // p.icp_samples
+    target = Target.of(first.raster.surface, p.icp)
+    # Held so loosely that any wall is stronger: only what no wall holds stays where it is.
+    prior = np.diag([1 / p.loose**2, 1 / p.loose**2, 0.0])
+    fits = align_all(surface.at(slice(None, None, stride)), target, starts, p.icp, prior)
+    return np.array([fit.pose for fit in fits])
 
 
 def _complexity(first: Shape, second: Shape, transform: FloatArray, p: FusionParameters) -> float:
-    return shared_complexity(first.raster, second.raster, transform, second.lines, p.verification)
+    """Return the complexity of what is shared [rad²], in the map that shows more of it (V2)."""
+    back = se2.inverse(transform)
+    return max(
+        shared_complexity(first.raster, second.raster, transform, second.lines, p.verification),
+        shared_complexity(second.raster, first.raster, back, first.lines, p.verification),
+    )
 
 
 def _numbers(hypothesis: Hypothesis) -> dict[str, float]:

@@ -1,7 +1,8 @@
 """Hypotheses: rigid transforms that the shapes of two maps propose (paper, VIII, H1 and H2).
 
-Salient windows of polylines and corners of walls each propose transforms; all proposals are
-scored at once by what both maps saw, and the best that clearly differ are handed on.
+Salient windows of polylines, corners of walls, and parallel walls each propose transforms. All
+proposals are scored at once by what both maps saw; the best that differ are aligned, all at once,
+and scored again; the best that clearly differ are handed on.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.corners import CornerParameters, Corners, find_corners, propose
+from mapweave.correlation import CorrelationParameters, Marks, correlate
+from mapweave.directions import likely_turns
 from mapweave.map_raster import MapRaster, RasterParameters
 from mapweave.maps import LineMap
+from mapweave.raster_alignment import RasterAlignmentParameters, align_on_raster
 from mapweave.shape_windows import WindowParameters, Windows, all_windows, match_all
 from mapweave.verification import VerificationParameters, coarse_scores
 
@@ -23,12 +27,21 @@ class HypothesisParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    windows: WindowParameters = WindowParameters()
+    windows: WindowParameters = WindowParameters(
+        lengths=(1.5, 4.0), samples=16, stride=0.15, max_windows=250, max_candidates=200
+    )
     corners: CornerParameters = CornerParameters()
-    max_samples: int = Field(250, ge=10, description="of a map's walls, in the scoring of all")
+    correlation: CorrelationParameters = CorrelationParameters()
+    turn_separation: float = Field(0.17, gt=0, description="[rad] between likely turns: 10°")
+    alignment: RasterAlignmentParameters = RasterAlignmentParameters()
+    proposal_samples: int = Field(60, ge=10, description="of a map's walls, scoring proposals")
+    aligned: int = Field(50, ge=2, description="proposals that are aligned, the best")
+    start_distance: float = Field(0.4, gt=0, description="[m] between those: what alignment mends")
+    start_turn: float = Field(0.09, gt=0, description="[rad] between those: 5°")
+    max_samples: int = Field(250, ge=10, description="of a map's walls, scoring what was aligned")
     distance: float = Field(1.0, gt=0, description="[m] between different hypotheses (design)")
     turn: float = Field(0.157, gt=0, description="[rad] between different hypotheses: 9° (design)")
-    count: int = Field(25, ge=2, description="handed on")
+    count: int = Field(5, ge=2, description="handed on")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,34 +77,65 @@ def hypothesise(
     Best first; any two differ by more than `parameters.distance` or `parameters.turn`, measured
     at the middle of `other`.
     """
-    similar = match_all(reference.windows, other.windows, parameters.windows)
-    cornered = propose(reference.corners, other.corners, parameters.corners)
-    proposals = np.vstack([similar.transform, cornered])
-    scores = coarse_scores(
-        reference.raster, other.raster, proposals, parameters.max_samples, verification
-    )
+    p = parameters
+    proposals = _proposals(reference, other, p, verification)
     middle = other.raster.surface.points.mean(axis=0)
-    kept = different(proposals, scores, middle, parameters)
-    return proposals[kept], scores[kept]
+    rough = coarse_scores(
+        reference.raster, other.raster, proposals, p.proposal_samples, verification
+    )
+    starts = _distinct(proposals, rough, middle, p.aligned, (p.start_distance, p.start_turn))
+    aligned = align_on_raster(reference.raster, other.raster, proposals[starts], p.alignment)
+    scores = coarse_scores(reference.raster, other.raster, aligned, p.max_samples, verification)
+    kept = different(aligned, scores, middle, p)
+    return aligned[kept], scores[kept]
+
+
+def _proposals(
+    reference: Shape,
+    other: Shape,
+    p: HypothesisParameters,
+    verification: VerificationParameters,
+) -> FloatArray:
+    """(n, 3) of windows alike, of corners alike, and of parallel walls."""
+    similar = match_all(reference.windows, other.windows, p.windows)
+    cornered = propose(reference.corners, other.corners, p.corners)
+    turns = likely_turns(
+        reference.lines.segments, other.lines.segments, p.correlation.turns, p.turn_separation
+    )
+    marks = [
+        Marks.of(shape.raster, verification.closeness, p.correlation.clearance)
+        for shape in (reference, other)
+    ]
+    weight = verification.contradiction_weight
+    shifted = correlate(marks[0], marks[1], turns, weight, p.correlation)
+    return np.vstack([similar.transform, cornered, shifted])
 
 
 def different(
     transforms: FloatArray, scores: FloatArray, middle: FloatArray, p: HypothesisParameters
 ) -> list[int]:
     """Return indices of the best of (n, 3) `transforms`, each different from the better ones."""
+    return _distinct(transforms, scores, middle, p.count, (p.distance, p.turn))
+
+
+def _distinct(
+    transforms: FloatArray,
+    scores: FloatArray,
+    middle: FloatArray,
+    count: int,
+    least: tuple[float, float],
+) -> list[int]:
+    """Return indices of at most `count`, best first, `least` [m], [rad] apart at `middle` (2,)."""
     c, s = np.cos(transforms[:, 2]), np.sin(transforms[:, 2])
     place = transforms[:, :2] + np.column_stack(
         [c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]]
     )
-    left = np.ones(len(transforms), dtype=np.bool_)
+    left = np.argsort(-scores, kind="stable")
     kept: list[int] = []
-    for index in np.argsort(-scores, kind="stable"):
-        if not left[index]:
-            continue
-        kept.append(int(index))
-        if len(kept) == p.count:
-            break
-        apart = np.hypot(*(place - place[index]).T)
-        turned = np.abs(se2.wrap(transforms[:, 2] - transforms[index, 2]))
-        left &= (apart > p.distance) | (turned > p.turn)
+    while len(left) and len(kept) < count:
+        best = int(left[0])
+        kept.append(best)
+        apart = np.hypot(*(place[left] - place[best]).T)
+        turned = np.abs(se2.wrap(transforms[left, 2] - transforms[best, 2]))
+        left = left[(apart > least[0]) | (turned > least[1])]
     return kept

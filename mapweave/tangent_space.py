@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapweave.arrays import FloatArray
+from mapweave.arrays import FloatArray, IntArray
 from mapweave.errors import MapweaveError
 from mapweave.se2 import wrap
 
@@ -138,3 +138,32 @@ def complexity(polyline: FloatArray) -> float:
     """
     straight = np.array([[0.0, 0.0, tangent_space(polyline).length, 0.0]])
     return similarity(polyline, straight)[0]
+
+
+def complexities(segments: FloatArray, polyline: IntArray) -> FloatArray:
+    """Return sc(P) [rad²], as of `complexity`, of every polyline at once.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], polyline by polyline, in order.
+    polyline
+        (n,) the polyline of each, ascending. One without any length has complexity 0.
+
+    Returns
+    -------
+    FloatArray
+        (k,) one for each name in `polyline`, ascending.
+    """
+    steps = segments[:, 2:] - segments[:, :2]
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    long = lengths > 0
+    names, owner = np.unique(polyline, return_inverse=True)
+    steps, lengths, owner = steps[long], lengths[long], owner[long]
+    # Where one polyline follows another the turn is of no account: the variance is about the mean.
+    direction = np.arctan2(steps[:, 1], steps[:, 0])
+    angle = np.cumsum(np.concatenate([direction[:1], wrap(np.diff(direction))]))
+    total = np.maximum(np.bincount(owner, lengths, len(names)), 1e-12)
+    mean = np.bincount(owner, lengths * angle, len(names)) / total
+    variance = np.bincount(owner, lengths * (angle - mean[owner]) ** 2, len(names)) / total
+    return np.asarray(variance)

@@ -11,10 +11,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
-from mapweave.arrays import BoolArray, FloatArray
+from mapweave.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mapweave.map_raster import MapRaster
 from mapweave.maps import LineMap
-from mapweave.tangent_space import complexity
+from mapweave.tangent_space import complexities
+
+DIRECTIONS = 64  # that coarse scores tell apart: 5.6° each
+NOTHING, SEEN_THROUGH = DIRECTIONS, DIRECTIONS + 1  # what a cell without a wall says
 
 
 class VerificationParameters(BaseModel):
@@ -38,7 +41,7 @@ class VerificationParameters(BaseModel):
         1.0, gt=0, description="metres in common that a metre contradicted outweighs"
     )
     shared_part: float = Field(
-        0.8, gt=0, le=1, description="share of a segment that coincides, to count as shared"
+        0.5, gt=0, le=1, description="share of a segment that coincides, to count as shared"
     )
 
 
@@ -103,22 +106,46 @@ def _coarse_one_way(
     max_samples: int,
     p: VerificationParameters,
 ) -> FloatArray:
+    """One look-up for each sample: in single precision, as the cells are coarser than that."""
     stride = 1 + (len(other.weight) - 1) // max_samples
-    sample = other.surface.at(slice(None, None, stride))
     weight = other.weight[::stride] * (other.weight.sum() / other.weight[::stride].sum())
-    c, s = np.cos(transforms[:, 2, None]), np.sin(transforms[:, 2, None])
-    (x, y), (u, v) = sample.points.T, sample.normals.T
-    placed = np.stack(
-        [c * x - s * y + transforms[:, 0, None], s * x + c * y + transforms[:, 1, None]], axis=-1
-    )
-    nearest, distance, depth = reference.look_up(placed)
-    theirs = reference.surface.normals[nearest]
-    cosine = (c * u - s * v) * theirs[..., 0] + (s * u + c * v) * theirs[..., 1]
-    near = distance < p.closeness
-    gain = near & (cosine > p.min_cosine)
-    loss = ~near & (depth > p.clearance)
-    scores: FloatArray = (gain - p.contradiction_weight * loss) @ weight
+    x, y = (other.surface.points[::stride].T / reference.cell).astype(np.float32)
+    facing = _directions(other.surface.normals[::stride]).astype(np.float32)
+    shift = ((transforms[:, :2] - reference.origin) / reference.cell).astype(np.float32)
+    turn = transforms[:, 2, None].astype(np.float32)
+    c, s = np.cos(turn), np.sin(turn)
+    rows, columns = reference.distance.shape
+    i = np.clip(c * x - s * y + shift[:, :1], 0, rows - 1).astype(np.int32)
+    j = np.clip(s * x + c * y + shift[:, 1:], 0, columns - 1).astype(np.int32)
+    said = _codes(reference, p).ravel()[i * columns + j]
+    direction = (facing + turn * np.float32(DIRECTIONS / (2 * np.pi))).astype(np.int32)
+    scores: FloatArray = _worth(p)[said + (direction & (DIRECTIONS - 1))] @ weight
     return scores
+
+
+def _directions(normals: FloatArray) -> FloatArray:
+    """(n,) directions of unit vectors, in [0, DIRECTIONS), shifted so that sums stay positive."""
+    turns = np.arctan2(normals[:, 1], normals[:, 0]) / (2 * np.pi)
+    return np.asarray((turns % 1.0 + 4) * DIRECTIONS)
+
+
+def _codes(raster: MapRaster, p: VerificationParameters) -> IntArray:
+    """(rows, columns) what each cell says: a row of `_worth`, as an offset into it."""
+    row = np.where(raster.depth > p.clearance, SEEN_THROUGH, NOTHING)
+    near = raster.distance < p.closeness
+    facing = _directions(raster.surface.normals).astype(np.int64) & (DIRECTIONS - 1)
+    row[near] = facing[raster.nearest[near]]
+    row[[0, -1], :] = row[:, [0, -1]] = NOTHING  # the rim stands for all that lies beyond it
+    return np.asarray(row * DIRECTIONS)
+
+
+def _worth(p: VerificationParameters) -> Float32Array:
+    """What a metre of wall counts, by the cell's code and the wall's direction, flat."""
+    turn = 2 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
+    worth: Float32Array = np.zeros((SEEN_THROUGH + 1, DIRECTIONS), dtype=np.float32)
+    worth[:DIRECTIONS] = np.cos(turn[:, None] - turn) > p.min_cosine
+    worth[SEEN_THROUGH] = -p.contradiction_weight
+    return worth.ravel()
 
 
 def verify(
@@ -160,11 +187,7 @@ def shared_complexity(
     counts = np.bincount(other.segment, minlength=len(lines.segments))
     hits = np.bincount(other.segment[coincides], minlength=len(lines.segments))
     shared = hits >= parameters.shared_part * np.maximum(counts, 1)
-    parts = [
-        lines.segments[shared & (lines.polyline == name)]
-        for name in np.unique(lines.polyline[shared])
-    ]
-    return max((complexity(part) for part in parts), default=0.0)
+    return float(complexities(lines.segments[shared], lines.polyline[shared]).max(initial=0.0))
 
 
 def _one_way(

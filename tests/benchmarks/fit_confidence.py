@@ -17,7 +17,8 @@ from matplotlib.figure import Figure
 
 from mapweave.arrays import BoolArray, FloatArray
 from mapweave.confidence import ConfidenceParameters, features, share
-from mapweave.verification import Verdict, VerificationParameters
+from mapweave.fusion import FusionParameters
+from mapweave.verification import Verdict
 from tests.benchmarks.fusion import ROWS
 from tests.benchmarks.logistic import (
     Bin,
@@ -30,7 +31,7 @@ from tests.benchmarks.logistic import (
 from tests.benchmarks.tables import OUTPUT, format_table, write_json
 
 MAX_BEND = 0.5  # [m] rms of the maps that the model is fitted to
-NAMES = ("common", "overlap", "held", "margin")  # of the slopes, as in `features`
+NAMES = ("score", "held")  # of the slopes, as in `features`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +103,7 @@ def read_examples(file: Path) -> Examples:
     rows = [row for row in json.loads(file.read_text()) if row["evidence"]]
     verdicts = [_verdicts(row) for row in rows]
     return Examples(
-        np.array([features(*pair) for pair in verdicts]),
+        np.array([features(best) for best, _ in verdicts]),
         np.array([share(*pair, ConfidenceParameters()) for pair in verdicts]),
         np.array([row["right"] for row in rows], dtype=np.bool_),
         np.array([row["decision"] == "accepted" for row in rows], dtype=np.bool_),
@@ -118,7 +119,7 @@ def _verdicts(row: dict[str, Any]) -> tuple[Verdict, Verdict | None]:
 
 def _verdict(numbers: dict[str, float]) -> Verdict:
     names = ("common", "contradicted", "overlap", "residual", "held")
-    weight = VerificationParameters().contradiction_weight
+    weight = FusionParameters().verification.contradiction_weight
     return Verdict(**{name: numbers[name] for name in names}, contradiction_weight=weight)
 
 

@@ -250,8 +250,8 @@ def test_maps_that_share_a_place_are_joined_and_all_is_told(
     done = mapweave("fuse", maps["a"], maps["b"], "--output", output)
     assert (done.returncode, done.stderr) == (0, "")
     first, second = done.stdout.splitlines()
-    assert re.match(r"a/0 - b/0: accepted \(\d+%\): \d+ m of wall in common", first)
-    assert re.match(r"component of a/0, b/0: \d+ segments, confidence \d+%$", second)
+    assert re.match(r"a/0 - b/0: accepted \((over )?\d+%\): \d+ m of wall in common", first)
+    assert re.match(r"component of a/0, b/0: \d+ segments, confidence (over )?\d+%$", second)
     joint = read_joint(output)
     (component,) = joint.components
     # Taken back into the building, both robots' frames are the same.

@@ -9,10 +9,12 @@ from mapweave.directions import (
     DIRECTED_PERIOD,
     LINE_PERIOD,
     direction_histogram,
+    likely_turns,
     line_difference,
     main_directions,
     nearest_direction,
 )
+from tests.mapweave.buildings import BUILDING, part
 
 
 def walls(degrees: FloatArray, length: float = 1.0) -> FloatArray:
@@ -121,3 +123,22 @@ def test_the_nearest_direction_is_that_of_a_line() -> None:
 
 def test_no_direction_is_near_when_there_is_none() -> None:
     assert np.isnan(nearest_direction(1.0, np.empty(0), 1.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_true_turn_is_among_the_likely_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(-np.pi, np.pi)
+    halves = part(BUILDING, 0, 18).segments, part(BUILDING, 8, 30).segments
+    turned = se2.transform_segments(np.array([3.0, -1.0, -turn]), halves[1])
+    found = likely_turns(halves[0], turned, 4, 0.17)
+    assert np.abs(se2.wrap(found - turn)).min() < np.radians(1.5)
+    apart = np.abs(se2.wrap(found[:, None] - found)) + np.pi * np.eye(len(found))
+    assert apart.min() > 0.17
+
+
+def test_visible_sides_tell_half_a_turn_from_none() -> None:
+    """Three walls of a room, seen from inside: only one turn lays them on themselves."""
+    walls = np.array([[0.0, 0, 6, 0], [6, 0, 6, 4], [0, 4, 0, 0]])
+    assert abs(likely_turns(walls, walls, 4, 0.17)[0]) < np.radians(1)
+    assert abs(se2.wrap(likely_turns(walls, walls[:, [2, 3, 0, 1]], 4, 0.17)[0] - np.pi)) < 0.02

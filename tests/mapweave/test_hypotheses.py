@@ -67,11 +67,13 @@ def test_hypotheses_come_best_first_and_all_differ() -> None:
         assert ((apart > 0.7 * P.distance) | (turned > P.turn)).all()
 
 
-def test_straight_walls_propose_nothing() -> None:
-    """Corridors without a corner in sight: no shape, no hypothesis."""
+def test_straight_walls_propose_only_to_slide_along_them() -> None:
+    """Corridors without a corner in sight: wall lies on wall, turned by half a turn or not."""
     walls = line_map(np.array([[0.0, 0, 30, 0], [30, 2, 0, 2]]))
-    transforms, scores = proposed(walls, walls)
-    assert transforms.shape == (0, 3) and scores.shape == (0,)
+    transforms, _ = proposed(walls, walls)
+    middle = np.array([se2.transform_points(t, [15.0, 1.0]) for t in transforms])
+    np.testing.assert_allclose(middle[:, 1], 1, atol=0.2)
+    np.testing.assert_allclose(np.sin(transforms[:, 2]), 0, atol=0.02)
 
 
 def test_the_best_of_what_is_alike_is_kept_and_the_rest_dropped(rng: Generator) -> None:

@@ -7,7 +7,13 @@ import pytest
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
-from mapweave.tangent_space import NoShapeError, complexity, similarity, tangent_space
+from mapweave.tangent_space import (
+    NoShapeError,
+    complexities,
+    complexity,
+    similarity,
+    tangent_space,
+)
 
 SEEDS = range(8)
 
@@ -156,3 +162,19 @@ def test_a_polyline_without_length_has_no_shape(polyline: FloatArray) -> None:
         complexity(polyline)
     with pytest.raises(NoShapeError):
         similarity(corner(1, 1, 1), polyline)
+
+
+def test_the_complexities_of_all_polylines_at_once_are_those_of_each() -> None:
+    rng = np.random.default_rng(1)
+    segments = rng.uniform(-3, 3, (40, 4))
+    segments[7, 2:] = segments[7, :2]  # one without length
+    polyline = np.sort(rng.integers(0, 9, 40))
+    each = [complexity(segments[polyline == name]) for name in np.unique(polyline)]
+    np.testing.assert_allclose(complexities(segments, polyline), each)
+
+
+def test_a_polyline_without_length_among_others_is_not_complex() -> None:
+    corner = np.array([[0.0, 0, 1, 0], [1, 0, 1, 1], [5, 5, 5, 5]])
+    expected = [complexity(corner[:2]), 0]
+    np.testing.assert_allclose(complexities(corner, np.array([0, 0, 4])), expected)
+    assert complexities(np.empty((0, 4)), np.empty(0, dtype=np.int64)).shape == (0,)
