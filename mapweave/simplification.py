@@ -16,6 +16,7 @@ from mapweave.merging import MergingParameters, evolve
 from mapweave.placement import PlacementParameters, cut, fit, trim
 from mapweave.selection import SelectionParameters, explained, select, shadowed
 from mapweave.straightening import StraighteningParameters, straighten
+from mapweave.wall_ends import WallEndParameters, meet_walls
 
 
 class SimplificationParameters(BaseModel):
@@ -33,6 +34,7 @@ class SimplificationParameters(BaseModel):
     selection: SelectionParameters = SelectionParameters()
     straightening: StraighteningParameters = StraighteningParameters()
     joining: JoiningParameters = JoiningParameters()
+    wall_ends: WallEndParameters = WallEndParameters()
 
 
 def simplify(
@@ -75,7 +77,7 @@ def simplify(
         candidates = np.concatenate([candidates, _placed(again, evidence, p)])
         chosen = candidates[select(candidates, evidence, price, p.selection)]
     walls = straighten(_trimmed(chosen, evidence, p), free, p.straightening)
-    return join_corners(walls, free, p.joining)
+    return meet_walls(join_corners(walls, free, p.joining), free, p.wall_ends)
 
 
 def sources(segments: FloatArray, sightings: FloatArray) -> tuple[IntArray, IntArray]:
