@@ -3,6 +3,7 @@
 By the means by which two robots' maps are joined: a component is a map like any other.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -31,7 +32,9 @@ class Reunion:
         submaps
             In the same order, with their new components and poses.
         joints
-            For each join, the ids of a submap of the older and one of the younger component.
+            For each join, the ids of a submap of the older and one of the younger component:
+            those whose walls are nearest, because there the shapes were compared, and what
+            tracking did to the rest of either component is not the join's.
         """
         joined = list(submaps)
         joints: list[tuple[int, int]] = []
@@ -39,7 +42,8 @@ class Reunion:
             for older in sorted({s.component for s in joined if s.component < younger}):
                 after = self._joined(joined, older, younger)
                 if after is not None:
-                    joints.append((_first(joined, older), _first(joined, younger)))
+                    of_younger = {s.id for s in joined if s.component == younger}
+                    joints.append(_nearest(after, older, of_younger))
                     joined = after
                     break
         return joined, joints
@@ -72,8 +76,25 @@ class Reunion:
         return any(w > (1 + GROWTH) * b for w, b in zip(walls, before, strict=True))
 
 
-def _first(submaps: Sequence[Submap], component: int) -> int:
-    return next(s.id for s in submaps if s.component == component)
+def _nearest(submaps: Sequence[Submap], component: int, younger: set[int]) -> tuple[int, int]:
+    """Return the ids of the nearest two submaps, one in `younger` and one that is not."""
+    inside = [(s.id, _middle(s)) for s in submaps if s.component == component]
+    _, first, second = min(
+        (math.dist(a, b), one, other)
+        for one, a in inside
+        if one not in younger
+        for other, b in inside
+        if other in younger
+    )
+    return first, second
+
+
+def _middle(submap: Submap) -> tuple[float, float]:
+    """Middle of a submap's walls, component frame [m]; of none its frame's origin."""
+    points = submap.map.segments.reshape(-1, 2)
+    middle = points.mean(axis=0) if len(points) else np.zeros(2)
+    x, y = se2.transform_points(submap.pose, middle).tolist()
+    return x, y
 
 
 def _wall(submaps: Sequence[Submap], component: int) -> float:

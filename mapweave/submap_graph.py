@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from mapweave import se2
 from mapweave.arrays import BoolArray, FloatArray
-from mapweave.maps import Submap
+from mapweave.maps import Submap, Trajectory
 from mapweave.pose_graph import Link, optimise
 
 CLOSURE_LENGTH = 2.0  # [m] of tracked path that errs about as much as a closure
@@ -28,11 +28,17 @@ class GraphParameters(BaseModel):
     tracking_sigma: float = Field(
         0.05,
         gt=0,
-        description="[m] from a submap to the next; median error against the corrected poses of"
-        " fr079, intel, intel-lab, csail, seattle: 0.03-0.07 m",
+        description="[m] from a submap to the next where it is not known how well its scans were"
+        " held; median error against the corrected poses of five logs: 0.03-0.07 m",
     )
     tracking_turn: float = Field(
         0.009, gt=0, description="[rad] the same for the turn; median 0.15-0.6°"
+    )
+    drift: float = Field(
+        2.0,
+        gt=0,
+        description="by how much more a submap errs than one of its scans: those are held to"
+        " 0.022-0.028 m (median of five logs), in corridors less along them",
     )
     joining_sigma: float = Field(0.1, gt=0, description="[m] of components joined by their shapes")
     joining_turn: float = Field(0.01, gt=0, description="[rad] of components joined")
@@ -53,13 +59,16 @@ class SubmapGraph:
 
     def track(self, previous: Submap, submap: Submap) -> None:
         """Note that `submap` followed `previous`, both of one component, by tracking."""
-        p = self._parameters
-        self._trust(previous, submap, p.tracking_sigma, p.tracking_turn, path_length(submap))
+        step = se2.between(previous.pose, submap.pose)
+        covariance = _tracking_covariance(previous.trajectory, step, self._parameters)
+        self._trust(Link(previous.id, submap.id, step, covariance, True), path_length(submap))
 
     def join(self, older: Submap, younger: Submap) -> None:
         """Note that two components were joined, at the present poses of these two submaps."""
         p = self._parameters
-        self._trust(older, younger, p.joining_sigma, p.joining_turn, path_length(younger))
+        covariance = np.diag(np.array([p.joining_sigma, p.joining_sigma, p.joining_turn]) ** 2)
+        step = se2.between(older.pose, younger.pose)
+        self._trust(Link(older.id, younger.id, step, covariance, True), path_length(younger))
 
     def lengths_from(self, submap: int, count: int) -> FloatArray:
         """(count,) [m] of tracked path by which each submap is known relative to `submap`.
@@ -92,12 +101,8 @@ class SubmapGraph:
             moved &= np.isin(np.arange(len(submaps)), nearest)
         return self._fitted(submaps, moved)
 
-    def _trust(
-        self, first: Submap, second: Submap, sigma: float, turn: float, length: float
-    ) -> None:
-        covariance = np.diag(np.array([sigma, sigma, turn]) ** 2)
-        step = se2.between(first.pose, second.pose)
-        self._links.append(Link(first.id, second.id, step, covariance, True))
+    def _trust(self, link: Link, length: float) -> None:
+        self._links.append(link)
         self._relied.append(True)
         self._lengths.append(length)
 
@@ -136,3 +141,22 @@ class SubmapGraph:
 def path_length(submap: Submap) -> float:
     """Return the length [m] of the path along which `submap` was made."""
     return float(np.hypot(*np.diff(submap.trajectory.pose[:, :2], axis=0).T).sum())
+
+
+def _tracking_covariance(path: Trajectory, step: FloatArray, p: GraphParameters) -> FloatArray:
+    """(3, 3) of a tracked `step` (3,) to the frame at its end, along the scans of `path`.
+
+    In a direction in which the scans were held worse, as along a corridor, it errs more.
+    """
+    held = path.uncertainty
+    if held is None or not held.any():
+        return np.diag(np.array([p.tracking_sigma, p.tracking_sigma, p.tracking_turn]) ** 2)
+    least, across, turn, direction = held.T
+    c, s = np.cos(direction - step[2]), np.sin(direction - step[2])
+    axes = np.stack([np.column_stack([c, s]), np.column_stack([-s, c])])
+    squares = np.stack([least, across]) ** 2
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = np.einsum("kn,kni,knj->ij", squares, axes, axes) / len(held)
+    covariance[:2, :2] *= p.drift**2
+    covariance[2, 2] = (turn**2).mean()
+    return covariance

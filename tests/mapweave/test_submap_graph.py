@@ -1,5 +1,6 @@
 """The links between submaps: which count, how far a closure reaches, what it costs."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -111,3 +112,29 @@ def test_a_long_loop_is_closed_all_the_way_round() -> None:
     gap = se2.between(positions(found)[0], positions(found)[40])
     assert np.hypot(*(gap - se2.between(true[0], true[40]))[:2]) < 0.1
     assert graph.neighbours(40) == [0, 39]
+
+
+def tracked_along_a_corridor(least: float) -> FloatArray:
+    """Return by how much each submap gives (4,) [m] when a closure asks for 0.4 m along x.
+
+    Scans of the second submap were held to `least` [m] along the corridor, all others to 0.02 m.
+    """
+    poses = np.array([[PATH * k, 0, 0] for k in range(5)])
+    graph = SubmapGraph(GraphParameters())
+    submaps = []
+    for k, pose in enumerate(poses):
+        plain = submap(k, pose)
+        along = least if k == 1 else 0.02
+        held = np.tile([along, 0.02, 0.005, 0.0], (2, 1))
+        submaps.append(replace(plain, trajectory=replace(plain.trajectory, uncertainty=held)))
+    for previous, following in pairwise(submaps):
+        graph.track(previous, following)
+    found = graph.close(submaps, [closure(0, 4, poses, np.array([0.4, 0, 0]))])
+    return np.asarray(np.diff(positions(found)[:, 0]) - PATH)
+
+
+def test_where_scans_were_held_worst_a_path_gives_most() -> None:
+    """Along a corridor tracking is loose, and an error at its end is most likely made in it."""
+    even, loose = tracked_along_a_corridor(0.02), tracked_along_a_corridor(0.2)
+    assert np.ptp(even) < 0.01
+    assert loose[1] > 5 * loose[[0, 2, 3]].max()
