@@ -56,6 +56,9 @@ class TrackerParameters(BaseModel):
         lt=1,
         description="of the evidence for a pose that does not convince, against it",
     )
+    doubt: float = Field(
+        4.0, ge=0, description="how often surprise counts against a pose that does not convince"
+    )
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
@@ -144,16 +147,21 @@ class Tracker:
         for enough, starts in stages:
             found += [t for t in self._aligned(seen, starts()) if self._is_reached(t)]
             best = max(found, key=lambda t: self._value(t, predicted), default=None)
-            if best is not None and self._is_enough(best.evidence, enough):
+            credible = best is not None and self._is_credible(best, predicted)
+            if best is not None and credible and best.evidence.score >= enough:
                 return self._slid(seen, best, predicted)
-        taken = best is not None and self._followed and self._stands_out(best, found)
+        taken = best is not None and credible and self._followed and self._stands_out(best, found)
         return best if taken else None
 
-    def _is_enough(self, evidence: Evidence, score: float) -> bool:
-        """Whether a pose reaches `score`, and convinces or is hardly disputed."""
+    def _is_credible(self, tracked: Tracked, predicted: FloatArray) -> bool:
+        """Whether a pose convinces, or is hardly disputed and takes no leap to get to.
+
+        After a jump that nobody told of, look-alikes within reach are neither.
+        """
         p = self.parameters
-        convinces = evidence.score >= p.convincing
-        return evidence.score >= score and (convinces or evidence.disputed <= p.max_disputed)
+        score, disputed = tracked.evidence.score, tracked.evidence.disputed
+        doubted = score - p.doubt * self._surprise(tracked, predicted)
+        return score >= p.convincing or (disputed <= p.max_disputed and doubted >= p.plausible)
 
     def _predictions(self, scan: Scan) -> FloatArray:
         """(k, 3) where the robot may be by now: by its odometry, and at constant velocity."""
@@ -192,7 +200,7 @@ class Tracker:
         )
         rivals = [t.evidence.score for t, other in zip(found, different, strict=True) if other]
         margin = best.evidence.score - max(rivals, default=-1.0)
-        return self._is_enough(best.evidence, p.plausible) and margin >= p.margin
+        return best.evidence.score >= p.plausible and margin >= p.margin
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
@@ -225,17 +233,19 @@ class Tracker:
         ]
 
     def _value(self, tracked: Tracked, predicted: FloatArray) -> float:
-        """Evidence less surprise: corridors leave a direction open, and speed is bounded.
+        """Evidence less surprise: corridors leave a direction open, and speed is bounded."""
+        evidence = tracked.evidence
+        worth = evidence.score + self.parameters.novelty * evidence.novel
+        return worth - self._surprise(tracked, predicted)
 
-        Of several predictions (k, 3) the one that comes nearest counts.
-        """
+    def _surprise(self, tracked: Tracked, predicted: FloatArray) -> float:
+        """How unlikely a motion is; of several predictions (k, 3) the nearest counts."""
         p = self.parameters
         x, y, turn = se2.between(predicted, tracked.pose).T
         # Heavy-tailed: robots do turn on the spot between two scans, only not often.
         moved = p.surprise * np.log1p((x * x + y * y) / p.motion_sigma**2)
         turned = p.turn_surprise * np.log1p((turn / p.turn_sigma) ** 2)
-        surprise = (moved + turned).min()
-        return float(tracked.evidence.score + p.novelty * tracked.evidence.novel - surprise)
+        return float((moved + turned).min())
 
 
 def _first() -> Tracked:
