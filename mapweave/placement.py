@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.arrays import BoolArray, FloatArray, IntArray
+from mapweave.directions import line_difference, nearest_direction
 from mapweave.evidence import Evidence, Nearness, units
 
 
@@ -37,6 +38,24 @@ def fit(segments: FloatArray, evidence: Evidence, parameters: PlacementParameter
     for _ in range(parameters.rounds):
         segments = _fit_once(segments, evidence, parameters)
     return segments
+
+
+def follow(
+    segments: FloatArray, directions: FloatArray, tolerance: float, max_shift: float
+) -> FloatArray:
+    """Return (n, 4) `segments` [m] turned about their middle to the main direction (paper, VI-A).
+
+    Only to one of the (k,) `directions` [rad] within `tolerance` [rad], and only where that moves
+    the ends by `max_shift` [m] at most: an oblique wall stays oblique.
+    """
+    ahead, lengths = units(segments)
+    angle = np.arctan2(ahead[:, 1], ahead[:, 0])
+    turn = line_difference(nearest_direction(angle, directions, tolerance), angle)
+    followed = lengths / 2 * np.abs(np.sin(turn)) <= max_shift  # never where there is none: NaN
+    new = angle + np.where(followed, turn, 0.0)
+    half = (lengths / 2)[:, None] * np.column_stack([np.cos(new), np.sin(new)])
+    middle = (segments[:, :2] + segments[:, 2:]) / 2
+    return np.where(followed[:, None], np.hstack([middle - half, middle + half]), segments)
 
 
 def cut(segments: FloatArray, evidence: Evidence, parameters: PlacementParameters) -> FloatArray:

@@ -11,9 +11,10 @@ from shapely.geometry.base import BaseGeometry
 
 from mapweave.arrays import BoolArray, FloatArray, IntArray
 from mapweave.corner_joining import JoiningParameters, join_corners
+from mapweave.directions import main_directions
 from mapweave.evidence import Evidence, Nearness, sample, units
 from mapweave.merging import MergingParameters, evolve
-from mapweave.placement import PlacementParameters, cut, fit, trim
+from mapweave.placement import PlacementParameters, cut, fit, follow, trim
 from mapweave.selection import SelectionParameters, explained, select, shadowed
 from mapweave.straightening import StraighteningParameters, straighten
 from mapweave.wall_ends import WallEndParameters, meet_walls
@@ -69,12 +70,14 @@ def simplify(
         return np.empty((0, 4))
     evidence = Evidence.of(sightings, counts, p.spacing).gathered()
     price = p.selection.price * evidence.weights.sum() / max(_wall(merged), 1e-9)
-    candidates = _placed(merged, evidence, p)
+    _, lengths = units(sightings)
+    directions = main_directions(sightings, lengths * counts, p.merging.directions)
+    candidates = _placed(merged, evidence, directions, p)
     chosen = candidates[select(candidates, evidence, price, p.selection)]
     missed = _missed(chosen, sightings, p)
     if missed.any():
         again = _proposed_again(sightings[missed], counts[missed], p)
-        candidates = np.concatenate([candidates, _placed(again, evidence, p)])
+        candidates = np.concatenate([candidates, _placed(again, evidence, directions, p)])
         chosen = candidates[select(candidates, evidence, price, p.selection)]
     walls = straighten(_trimmed(chosen, evidence, p), free, p.straightening)
     return meet_walls(join_corners(walls, free, p.joining), free, p.wall_ends)
@@ -101,9 +104,13 @@ def sources(segments: FloatArray, sightings: FloatArray) -> tuple[IntArray, IntA
     return pairs[enough, 0], pairs[enough, 1]
 
 
-def _placed(segments: FloatArray, evidence: Evidence, p: SimplificationParameters) -> FloatArray:
-    """Return the parts of `segments` that lie where most was seen, fitted to it."""
-    placed = cut(fit(segments, evidence, p.placement), evidence, p.placement)
+def _placed(
+    segments: FloatArray, evidence: Evidence, directions: FloatArray, p: SimplificationParameters
+) -> FloatArray:
+    """Return the parts of `segments` that lie where most was seen, in main directions if near."""
+    fitted = fit(segments, evidence, p.placement)
+    straight = follow(fitted, directions, p.merging.direction_tolerance, p.merging.max_shift)
+    placed = cut(straight, evidence, p.placement)
     return placed[_is_long(placed, p)]
 
 

@@ -6,7 +6,7 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.evidence import Evidence, Nearness
-from mapweave.placement import PlacementParameters, cut, fit, trim
+from mapweave.placement import PlacementParameters, cut, fit, follow, trim
 from mapweave.selection import SelectionParameters, explained, shadowed
 from tests.mapweave.buildings import random_pose
 
@@ -86,3 +86,16 @@ def test_a_later_segment_keeps_only_what_no_earlier_one_stands_for() -> None:
 def test_a_segment_with_nothing_of_its_own_has_no_length_left() -> None:
     found = trimmed([[0, 0, 5, 0], [1, 0.1, 4, 0.1]], seen([[0, 0, 5, 0]], [5]))
     np.testing.assert_allclose(found[1, :2], found[1, 2:])
+
+
+def test_a_wall_hardly_off_a_main_direction_follows_it_and_an_oblique_one_does_not() -> None:
+    walls = np.array([[0.0, 0.0, 4.0, 0.04], [4.0, 1.0, 0.0, 1.02], [0.0, 2.0, 4.0, 2.3]])
+    found = follow(walls, np.array([0.0, np.pi / 2]), np.deg2rad(5.0), 0.03)
+    np.testing.assert_allclose(found[:2, 1], found[:2, 3], atol=1e-12)
+    assert np.abs(found[:2] - walls[:2]).max() < 0.03
+    np.testing.assert_array_equal(found[2], walls[2])
+
+
+def test_where_there_is_no_main_direction_every_wall_stays() -> None:
+    walls = np.array([[0.0, 0.0, 4.0, 0.04]])
+    np.testing.assert_array_equal(follow(walls, np.empty(0), 0.1, 0.03), walls)
