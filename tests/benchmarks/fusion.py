@@ -18,6 +18,7 @@ from tests.benchmarks.tables import OUTPUT, format_table, write_json
 ROWS = OUTPUT / "fusion.json"
 BENT = 0.3  # [m] rms from which on a map is named as bent
 GROUPS = (50.0, 30.0, 15.0, 5.0, 0.0)  # [m] in common, at least
+SIZES = (0, 100, 150, 300, 500)  # segments of the larger map, at least
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 
@@ -108,13 +109,22 @@ def _degrees(match: Match) -> str:
 
 
 def _tell_time(pairs: Sequence[Pair]) -> str:
+    """Return how long comparing two components took, by the size of the larger map."""
+    rows = []
+    for least, most in zip(SIZES, [*SIZES[1:], math.inf], strict=True):
+        group = [pair for pair in pairs if least <= max(pair.segments) < most]
+        for joined in (True, False):
+            part = [pair for pair in group if pair.outcome.startswith("joined") == joined]
+            if part:
+                rows.append(_time_row(f"{least} and more", "joined" if joined else "not", part))
+    head = ["segments", "maps are", "pairs", "median ms", "95 % ms"]
+    return "Comparing two components, their preparation included:\n" + format_table(head, rows)
+
+
+def _time_row(size: str, joined: str, pairs: Sequence[Pair]) -> list[str]:
     each = [1000 * pair.seconds / len(pair.matches) for pair in pairs]
-    segments = np.median([count for pair in pairs for count in pair.segments])
-    return (
-        f"Comparing two components took {np.median(each):.0f} ms at the median,"
-        f" {np.percentile(each, 95):.0f} ms at the 95th percentile (maps of {segments:.0f} segments"
-        " at the median, their preparation included)."
-    )
+    median, most = np.percentile(each, [50, 95])
+    return [size, joined, str(len(pairs)), f"{median:.0f}", f"{most:.0f}"]
 
 
 def _rows(pair: Pair) -> list[dict[str, object]]:
