@@ -1,9 +1,16 @@
 """What counts as doubled, as a sliver and as meeting."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from mapweave.readers import read_scans
 from tests.benchmarks.compactness import compactness
+from tests.benchmarks.coverage import explained_share, returns_at
+from tests.benchmarks.mapping import merge, segments_of
+from tests.benchmarks.runs import map_scans
+from tests.benchmarks.truth import paths
 
 WALL = [0.0, 0.0, 4.0, 0.0]
 
@@ -36,3 +43,18 @@ def test_slivers_and_meeting_ends_are_counted() -> None:
     assert (found.segments, found.slivers) == (3, 1)
     assert found.meeting == pytest.approx(2 / 6)
     assert found.length == pytest.approx(7.2)
+
+
+@pytest.mark.slow
+def test_130_segments_explain_97_percent_of_a_real_building_and_double_no_wall(
+    data_dir: Path,
+) -> None:
+    scans = list(read_scans(data_dir / "seattle.log.gz", on_warning=print))
+    robot_map = map_scans("seattle", scans).robot_map
+    path = paths(robot_map)[0]
+    lines = segments_of(merge(robot_map), path.component)
+    seen = returns_at([scans[k] for k in path.index], path.pose)
+    assert explained_share(seen, lines) >= 0.97
+    found = compactness(lines)
+    assert found.segments <= 130
+    assert found.doubled < 0.01
