@@ -50,15 +50,10 @@ class TrackerParameters(BaseModel):
     convincing: float = Field(0.75, description="score above which no search is made")
     acceptable: float = Field(0.5, description="score above which a searched pose is taken")
     plausible: float = Field(0.25, description="score above which one without a rival is taken")
-    max_disputed: float = Field(
-        0.17,
-        gt=0,
-        lt=1,
-        description="of the evidence for a pose that does not convince, against it",
+    max_doubt: float = Field(
+        0.2, gt=0, description="about a pose that does not convince: its disputed share, its leap"
     )
-    doubt: float = Field(
-        4.0, ge=0, description="how often surprise counts against a pose that does not convince"
-    )
+    leap: float = Field(1.5, ge=0, description="what surprise counts in that doubt")
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
@@ -159,9 +154,8 @@ class Tracker:
         After a jump that nobody told of, look-alikes within reach are neither.
         """
         p = self.parameters
-        score, disputed = tracked.evidence.score, tracked.evidence.disputed
-        doubted = score - p.doubt * self._surprise(tracked, predicted)
-        return score >= p.convincing or (disputed <= p.max_disputed and doubted >= p.plausible)
+        doubt = tracked.evidence.disputed + p.leap * self._surprise(tracked, predicted)
+        return tracked.evidence.score >= p.convincing or doubt <= p.max_doubt
 
     def _predictions(self, scan: Scan) -> FloatArray:
         """(k, 3) where the robot may be by now: by its odometry, and at constant velocity."""
