@@ -51,9 +51,9 @@ class TrackerParameters(BaseModel):
     acceptable: float = Field(0.5, description="score above which a searched pose is taken")
     plausible: float = Field(0.25, description="score above which one without a rival is taken")
     max_doubt: float = Field(
-        0.2, gt=0, description="about a pose that does not convince: its disputed share, its leap"
+        0.25, gt=0, description="about a pose that does not convince: its disputed share, its leap"
     )
-    leap: float = Field(1.5, ge=0, description="what surprise counts in that doubt")
+    leap: float = Field(2.5, ge=0, description="what surprise counts in that doubt")
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
