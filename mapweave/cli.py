@@ -5,6 +5,7 @@ subcommand asked for is imported.
 """
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -51,6 +52,22 @@ def argument(parse: Callable[[str], T]) -> Callable[[str], T]:
             raise argparse.ArgumentTypeError(str(error)) from error
 
     return parse_argument
+
+
+def positive(text: str) -> float:
+    """Return the number that `text` says, more than 0; ValueError otherwise."""
+    value = float(text)
+    if not 0 < value < math.inf:
+        raise ValueError(f"{text}: expected a number, more than 0")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """Return the number that `text` says, 0 or more; ValueError otherwise."""
+    value = float(text)
+    if not 0 <= value < math.inf:
+        raise ValueError(f"{text}: expected a number, 0 or more")
+    return value
 
 
 def _overview(points: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ from mapweave_agent.outbox import Outbox
 from mapweave_agent.planning import AgentParameters, PublicationPlan
 from mapweave_agent.reception import Reception
 from mapweave_agent.source import Pace
+from mapweave_agent.strays import without_strays
 from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.inbox import Inbox
 from mapweave_protocol.keys import ALIGNMENT, LIVE, MAP, STATUS
@@ -166,7 +167,7 @@ class Agent:
         self._outbox.send_alignments(message)
 
     def _publish_map(self, *, complete: bool) -> None:
-        self._published = self._mapper.robot_map()
+        self._published = without_strays(self._mapper.robot_map())
         self._outbox.send_map(self._published, complete=complete)
         self._comparisons.own_map(self._published, finished=self._finished)
         self._publication.published(time.monotonic())

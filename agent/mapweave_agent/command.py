@@ -2,11 +2,10 @@
 
 import argparse
 import logging
-import math
 import sys
 from pathlib import Path
 
-from mapweave.cli import Command, argument
+from mapweave.cli import Command, argument, positive
 from mapweave.fusion import align_robots
 from mapweave.mapper import Mapper, MapperParameters
 from mapweave.names import check_id
@@ -43,7 +42,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--map-interval",
-        type=argument(_seconds),
+        type=argument(positive),
         default=AgentParameters().map_interval,
         metavar="S",
         help="least time between two messages of the growing submap [s] (default %(default)g)",
@@ -75,13 +74,6 @@ def _run(options: argparse.Namespace) -> int:
         agent = Agent(session, team, mapper, comparer, source.total, parameters)
         agent.run(source.scans(), pace, stop_on_signal())
     return 0
-
-
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0 < seconds < math.inf:
-        raise ValueError(f"{text!r}: expected seconds, more than 0")
-    return seconds
 
 
 command = Command("map the scans of one robot, and compare with its team", _configure, _run)

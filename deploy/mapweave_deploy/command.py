@@ -3,7 +3,8 @@
 import argparse
 import signal
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from mapweave.files import write_joint
 from mapweave.names import check_id
 from mapweave.picture import draw_joint
 from mapweave_deploy.crew import Crew
-from mapweave_deploy.display import make_display
+from mapweave_deploy.display import open_display
 from mapweave_deploy.launcher import Outcome, Plan, free_endpoint, run_team, start_server
 from mapweave_deploy.options import check_source, configure
 from mapweave_deploy.report import tell_files, tell_outcome, tell_verdicts
@@ -83,10 +84,11 @@ def run(options: argparse.Namespace) -> int:
     folder = Folder(options.output)
     folder.create()
     _say(console, [_source(options)])
-    plan = _plan(options, folder)
-    with Crew(folder.logs) as crew:
+    # The crew stops before what it wrote to is removed.
+    with _unfinished_store(folder.store) as new, Crew(folder.logs) as crew:
+        plan = _plan(options, folder, options.store or new)
         _say(console, [_how_to_watch(plan)])
-        with make_display(console, plan.members) as display:
+        with open_display(console, plan.members) as display:
             outcome = run_team(crew, plan, display)
         store = _keep_store(plan.store, options.store or folder.store)
         _write(outcome, folder)
@@ -100,13 +102,13 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _plan(options: argparse.Namespace, folder: Folder) -> Plan:
+def _plan(options: argparse.Namespace, folder: Folder, store: Path) -> Plan:
     return Plan(
         team=options.team,
         members=_members(options, folder),
         rate=options.rate,
         listen=options.listen or free_endpoint(),
-        store=options.store or _new_store(folder.store),
+        store=store,
         timeout=options.timeout,
     )
 
@@ -117,12 +119,21 @@ def _members(options: argparse.Namespace, folder: Folder) -> list[Member]:
     return team_from_logs(options.logs, options.robots)
 
 
-def _new_store(final: Path) -> Path:
-    """Return where the store is written until it is whole: an older one survives a failure."""
+@contextmanager
+def _unfinished_store(final: Path) -> Iterator[Path]:
+    """Give where the store is written until it is whole: an older one survives a failure."""
     new = final.with_name(f"{final.stem}-new{final.suffix}")
-    for leftover in (new, *(new.with_name(new.name + end) for end in ("-wal", "-shm"))):
-        leftover.unlink(missing_ok=True)
-    return new
+    _remove_store(new)
+    try:
+        yield new
+    finally:
+        _remove_store(new)
+
+
+def _remove_store(path: Path) -> None:
+    """Remove what there is of a store, with the files SQLite keeps beside it."""
+    for end in ("", "-wal", "-shm"):
+        path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def _keep_store(written: Path, final: Path) -> Path:

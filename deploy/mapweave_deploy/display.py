@@ -1,7 +1,7 @@
 """What a person sees while a team runs: bars at a terminal, plain lines elsewhere."""
 
-from collections.abc import Mapping
-from types import TracebackType
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Protocol
 
 from rich.console import Console
@@ -13,24 +13,13 @@ from mapweave_protocol.messages import StatusMessage
 
 
 class Display(Protocol):
-    """Shows a team's progress; a context manager."""
+    """Shows a team's progress."""
 
     def say(self, line: str) -> None:
         """Show a line of what happens."""
 
     def update(self, statuses: Mapping[str, StatusMessage]) -> None:
         """Show how far each robot is."""
-
-    def __enter__(self) -> "Display":
-        """Begin to show."""
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave the terminal as it should be."""
 
 
 class Lines:
@@ -46,29 +35,12 @@ class Lines:
     def update(self, statuses: Mapping[str, StatusMessage]) -> None:
         """Show nothing: the lines tell when a robot has finished."""
 
-    def __enter__(self) -> "Lines":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        pass
-
 
 class Bars:
     """A bar for each robot, the lines above them."""
 
-    def __init__(self, console: Console, members: list[Member]) -> None:
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[state]}"),
-            TimeElapsedColumn(),
-            console=console,
-        )
+    def __init__(self, progress: Progress, members: list[Member]) -> None:
+        self._progress = progress
         self._tasks: dict[str, TaskID] = {
             member.robot: self._progress.add_task(
                 member.robot, total=member.scans[1] - member.scans[0], state="starting"
@@ -87,23 +59,22 @@ class Bars:
             if status is not None:
                 self._progress.update(task, completed=status.scans_seen, state=_words(status))
 
-    def __enter__(self) -> "Bars":
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._progress.stop()
-
 
 def _words(status: StatusMessage) -> str:
     return f"{status.scans_placed} placed, {status.submaps} submaps, {status.state}"
 
 
-def make_display(console: Console, members: list[Member]) -> Display:
-    """Return what suits the console."""
-    return Bars(console, members) if console.is_terminal else Lines(console)
+@contextmanager
+def open_display(console: Console, members: list[Member]) -> Iterator[Display]:
+    """Give what suits the console; the terminal is left as it should be."""
+    if not console.is_terminal:
+        yield Lines(console)
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[state]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        yield Bars(progress, members)

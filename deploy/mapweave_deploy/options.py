@@ -1,11 +1,10 @@
 """The arguments of ``mapweave team``."""
 
 import argparse
-import math
 import re
 from pathlib import Path
 
-from mapweave.cli import argument
+from mapweave.cli import argument, positive
 from mapweave_deploy.simulation import BUILDERS
 from mapweave_protocol.arguments import DEFAULT_TEAM
 from mapweave_protocol.session import MAX_PORT
@@ -33,7 +32,8 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         type=Path,
         metavar="LOG",
-        help="recorded scans, cut into overlapping stretches, one a robot",
+        help="recorded scans, cut into overlapping stretches, one a robot; several logs are of"
+        " different buildings",
     )
     parser.add_argument(
         "--world", choices=sorted(BUILDERS), help="a simulated place instead of logs"
@@ -73,7 +73,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--timeout",
-        type=argument(_seconds),
+        type=argument(positive),
         metavar="S",
         help="give up after S seconds (default: never)",
     )
@@ -114,16 +114,9 @@ def _positive(text: str) -> int:
     return value
 
 
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{text}: expected more than 0")
-    return value
-
-
 def _rate(text: str) -> str:
     if text != "max":
-        _seconds(text)
+        positive(text)
     return text
 
 

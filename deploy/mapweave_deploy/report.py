@@ -1,5 +1,6 @@
 """What a team came to, in words."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from mapweave.maps import Alignment, JointComponent, RobotMap
 from mapweave_deploy.launcher import Outcome
 from mapweave_deploy.occupancy import grid_bytes
 from mapweave_deploy.roster import Member
-from mapweave_deploy.verdict import Limits, Verdict, judge
+from mapweave_deploy.verdict import Limits, Verdict, judge, main_component, scan_counts
 
 WORLD_LIMITS = Limits(0.3, np.radians(3.0))
 LOG_LIMITS = Limits(0.5, np.radians(5.0))
@@ -79,8 +80,7 @@ def tell_verdicts(outcome: Outcome, members: Sequence[Member], *, simulated: boo
     """Yield how many components there are, and whether what was joined is right."""
     limits = WORLD_LIMITS if simulated else LOG_LIMITS
     verdicts = list(judge(outcome.joint, outcome.maps, members, limits))
-    count = len(outcome.joint.components)
-    yield f"{len(members)} robots in {count} component{'' if count == 1 else 's'}."
+    yield from _tell_components(outcome, members, verdicts)
     for verdict in verdicts:
         yield f"  {verdict.reference} and {verdict.other}: {_tell_error(verdict)}"
     if verdicts:
@@ -89,6 +89,30 @@ def tell_verdicts(outcome: Outcome, members: Sequence[Member], *, simulated: boo
             f"{right} of {len(verdicts)} joined pairs are right within {limits.distance:g} m and"
             f" {np.degrees(limits.angle):g}° of {SIMULATED if simulated else LOGGED}."
         )
+
+
+def _tell_components(
+    outcome: Outcome, members: Sequence[Member], verdicts: Sequence[Verdict]
+) -> Iterator[str]:
+    """Yield in how many components the robots are, and what is left over."""
+    mains = {main_component(robot_map) for robot_map in outcome.maps.values()}
+    homes = [c for c in outcome.joint.components if not mains.isdisjoint(c.robots)]
+    yield f"{len(members)} robots in {len(homes)} component{'' if len(homes) == 1 else 's'}."
+    places = len({member.place for member in members})
+    if places > 1 and not any(np.isinf(verdict.distance) for verdict in verdicts):
+        yield f"Nothing is joined across the {places} logs."
+    for component in outcome.joint.components:
+        if mains.isdisjoint(component.robots):
+            yield f"  joined to none of them: {_tell_rest(component, outcome)}"
+    if not verdicts and any(len(component.robots) > 1 for component in outcome.joint.components):
+        yield "What was joined cannot be judged: there are no poses in the log."
+
+
+def _tell_rest(component: JointComponent, outcome: Outcome) -> str:
+    """Tell a component that no robot's main part is in, and how many scans it has."""
+    counts = sum(map(scan_counts, outcome.maps.values()), Counter[str]())
+    scans = sum(counts[name] for name in component.robots)
+    return f"{' + '.join(sorted(component.robots))} ({scans} scan{'' if scans == 1 else 's'})"
 
 
 def _tell_error(verdict: Verdict) -> str:

@@ -28,7 +28,7 @@ class Member:
         Members with the same place can be joined rightly; others cannot.
     truth_index, truth_pose
         (m,) scan indices and (m, 3) where they were taken [m, m, rad]: simulated, or the poses
-        in the log.
+        in the log; none where they are not known.
     """
 
     robot: str
@@ -63,8 +63,15 @@ def team_from_logs(logs: list[Path], robots: int) -> list[Member]:
         count = count_scans(log)
         if count < robots:
             raise FileError(log, f"{count} scans, expected at least one for each robot ({robots})")
-        index, pose = read_reference_poses(log)
+        index, pose = _truth(log)
         for scans in cut(count, robots):
             name = f"r{len(members) + 1}"
             members.append(Member(name, log, scans, str(log), index, pose))
     return members
+
+
+def _truth(log: Path) -> tuple[IntArray, FloatArray]:
+    """Return the poses in a log; none where all are the same, which is how none are written."""
+    index, pose = read_reference_poses(log)
+    known = slice(None) if len(pose) and np.ptp(pose, axis=0).any() else slice(0)
+    return index[known], pose[known]

@@ -1,5 +1,6 @@
 """Whether robots were joined rightly: their places to each other against the truth."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -65,7 +66,7 @@ class Placed:
     place
         Where the truth is given: in one log, or one world.
     joint, true
-        (3,) poses of the component's frame [m, m, rad].
+        (3,) poses of the component's frame [m, m, rad]; `true` is None where it is not known.
     path
         (m, 2) of its scans, in its frame [m].
     """
@@ -73,14 +74,17 @@ class Placed:
     name: str
     place: str
     joint: FloatArray
-    true: FloatArray
+    true: FloatArray | None
     path: FloatArray
 
 
 def judge(
     joint: JointMap, maps: Mapping[str, RobotMap], members: Sequence[Member], limits: Limits
 ) -> Iterator[Verdict]:
-    """Yield a verdict on every pair of components that `joint` holds together."""
+    """Yield a verdict on every pair of components that `joint` holds together.
+
+    Pairs in one place whose truth is not known are left out.
+    """
     placed = {
         part.name: part
         for member in members
@@ -90,19 +94,33 @@ def judge(
     for component in joint.components:
         for reference, other in combinations(sorted(component.robots), 2):
             if reference in placed and other in placed:
-                yield _compare(placed[reference], placed[other], limits)
+                yield from _compare(placed[reference], placed[other], limits)
 
 
 def _placed(joint: JointMap, robot_map: RobotMap, member: Member) -> Iterator[Placed]:
-    """Yield the components of a robot of which enough is known to judge them."""
+    """Yield the components of a robot's map that are in the joint map."""
     poses = {name: pose for part in joint.components for name, pose in part.robots.items()}
     for component in robot_map.components:
         name = component_name(robot_map.robot, component)
         index, path = component_path(robot_map, component)
         _, here, there = np.intersect1d(index, member.truth_index, return_indices=True)
-        if name in poses and len(here):
-            true = fit(path[here], member.truth_pose[there])
+        if name in poses:
+            true = fit(path[here], member.truth_pose[there]) if len(here) else None
             yield Placed(name, member.place, poses[name], true, path[:, :2])
+
+
+def scan_counts(robot_map: RobotMap) -> Counter[str]:
+    """Return by name how many scans each component of a robot's map has."""
+    counts: Counter[str] = Counter()
+    for submap in robot_map.submaps:
+        name = component_name(robot_map.robot, submap.component)
+        counts[name] += len(submap.trajectory.scan_index)
+    return counts
+
+
+def main_component(robot_map: RobotMap) -> str:
+    """Return the name of the component with most scans, which stands for the robot."""
+    return scan_counts(robot_map).most_common(1)[0][0]
 
 
 def component_path(robot_map: RobotMap, component: int) -> tuple[IntArray, FloatArray]:
@@ -127,11 +145,17 @@ def fit(poses: FloatArray, truth: FloatArray) -> FloatArray:
     return np.array([shift.real, shift.imag, theta])
 
 
-def _compare(reference: Placed, other: Placed, limits: Limits) -> Verdict:
+def _compare(reference: Placed, other: Placed, limits: Limits) -> Iterator[Verdict]:
     if reference.place != other.place:
-        return Verdict(reference.name, other.name, np.inf, np.pi, right=False)
+        yield Verdict(reference.name, other.name, np.inf, np.pi, right=False)
+    elif reference.true is not None and other.true is not None:
+        true = se2.between(reference.true, other.true)
+        yield _compare_poses(reference, other, true, limits)
+
+
+def _compare_poses(reference: Placed, other: Placed, true: FloatArray, limits: Limits) -> Verdict:
+    """Judge by `true` (3,), the pose of `other` in the frame of `reference`."""
     found = se2.between(reference.joint, other.joint)
-    true = se2.between(reference.true, other.true)
     apart = se2.transform_points(found, other.path) - se2.transform_points(true, other.path)
     distance = float(np.median(np.linalg.norm(apart, axis=1)))
     angle = float(np.abs(se2.wrap(found[2] - true[2])))

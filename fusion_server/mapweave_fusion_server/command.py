@@ -5,7 +5,7 @@ import logging
 import sys
 from pathlib import Path
 
-from mapweave.cli import Command, argument
+from mapweave.cli import Command, argument, not_negative
 from mapweave_fusion_server.coordinator import CoordinatorParameters
 from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
@@ -28,7 +28,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--min-interval",
-        type=argument(_seconds),
+        type=argument(not_negative),
         default=DEFAULT_INTERVAL,
         metavar="S",
         help="least time between two versions [s] unless maps are joined or parted"
@@ -53,13 +53,6 @@ def _run(options: argparse.Namespace) -> int:
     ):
         Service(session, team, store, parameters).run(stop_on_signal())
     return 0
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0 <= value < float("inf"):
-        raise ValueError(f"{text}: expected seconds, 0 or more")
-    return value
 
 
 command = Command("coordinate a team: maps and alignments in, joint maps out", _configure, _run)

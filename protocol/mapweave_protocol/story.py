@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mapweave.confidence import percent
-from mapweave.maps import Alignment, JointComponent, JointMap, RobotMap
-from mapweave.revocation import objection
+from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave_protocol.messages import AlignmentMessage, StatusMessage
+from mapweave_protocol.story_alignments import AlignmentStory
+from mapweave_protocol.story_joint import JointStory
 
 
 @dataclass
@@ -17,12 +17,16 @@ class RobotState:
     ----------
     boot
         Of the run that is alive, None if none is.
+    map
+        Its last map.
+    told
+        How many submaps its map had when that was told last.
     """
 
     boot: str | None = None
     status: StatusMessage | None = None
-    submaps: int = 0
-    segments: int = 0
+    map: RobotMap | None = None
+    told: int = 0
 
     @property
     def progress(self) -> str:
@@ -32,15 +36,29 @@ class RobotState:
         total = f"/{self.status.scans_total}" if self.status.scans_total else ""
         return f"{self.status.scans_seen}{total} scans, {self.status.scans_placed} placed"
 
+    @property
+    def submaps(self) -> int:
+        """How many submaps its map has."""
+        return len(self.map.submaps) if self.map else 0
+
+    @property
+    def segments(self) -> int:
+        """How many segments its submaps have, each counted for itself."""
+        return sum(len(s.map.segments) for s in self.map.submaps) if self.map else 0
+
 
 class Story:
     """Takes in what happens, and returns the lines that tell what is new about it."""
 
     def __init__(self) -> None:
         self.robots: dict[str, RobotState] = {}
-        self.joint: JointMap | None = None
-        self._decisions: dict[tuple[str, str], str] = {}
-        self._objections: dict[tuple[str, str], int | None] = {}
+        self._alignments = AlignmentStory()
+        self._joint = JointStory()
+
+    @property
+    def joint(self) -> JointMap | None:
+        """The last version of the joint map."""
+        return self._joint.joint
 
     def appeared(self, robot: str, boot: str) -> Iterator[str]:
         """Tell that a run of a robot began."""
@@ -65,55 +83,53 @@ class Story:
             yield f"{message.robot} has finished: {state.progress}"
 
     def mapped(self, robot_map: RobotMap) -> Iterator[str]:
-        """Tell when a robot's map has got another submap."""
+        """Tell that a robot lost its way or found it, and when its map is twice what was told."""
         state = self._robot(robot_map.robot)
-        before, state.submaps = state.submaps, len(robot_map.submaps)
-        state.segments = sum(len(submap.map.segments) for submap in robot_map.submaps)
-        if state.submaps != before:
-            parts = len(robot_map.components)
-            pieces = f" in {parts} components" if parts > 1 else ""
+        before, state.map = state.map, robot_map
+        if before is not None and before.boot == robot_map.boot:
+            yield from _tell_lost(before, robot_map)
+            yield from _tell_found(before, robot_map)
+        else:
+            state.told = 0
+        if state.submaps >= max(2 * state.told, 1):
+            state.told = state.submaps
             yield (
-                f"{robot_map.robot}: {_count(state.submaps, 'submap')}{pieces},"
+                f"{robot_map.robot}: {_count(state.submaps, 'submap')}{_pieces(robot_map)},"
                 f" {_count(state.segments, 'segment')}"
             )
 
     def aligned(self, message: AlignmentMessage) -> Iterator[str]:
-        """Tell each decision that is new."""
-        for alignment in message.alignments:
-            pair = alignment.reference, alignment.other
-            if self._decisions.get(pair) != alignment.decision:
-                self._decisions[pair] = alignment.decision
-                yield (
-                    f"{pair[0]} and {pair[1]}: {alignment.decision},"
-                    f" confidence {percent(alignment.confidence)} ({alignment.reason})"
-                )
+        """Tell what is new about how two robots' maps lie to each other."""
+        yield from self._alignments.decided(message)
 
     def joined(self, joint: JointMap) -> Iterator[str]:
-        """Tell a version of the joint map, and each join that it is the first not to rely on."""
-        self.joint = joint
-        groups = [_tell_component(component) for component in joint.components]
-        yield f"joint map {joint.version}: {', '.join(groups) or 'nothing yet'}"
-        for alignment in joint.alignments:
-            yield from self._objected(alignment)
-
-    def _objected(self, alignment: Alignment) -> Iterator[str]:
-        pair = alignment.reference, alignment.other
-        found = objection(alignment)
-        if found is None:
-            self._objections.pop(pair, None)
-        elif self._objections.get(pair, -1) != found.revoked:
-            self._objections[pair] = found.revoked
-            what = f"revoked in version {found.revoked}" if found.revoked else "not relied on"
-            yield f"{pair[0]} and {pair[1]}: alignment {what} ({found.reason})"
+        """Tell what is new about the joint map, and each join that it is the first not to use."""
+        yield from self._joint.changed(joint)
+        yield from self._alignments.judged(joint)
 
     def _robot(self, robot: str) -> RobotState:
         return self.robots.setdefault(robot, RobotState())
 
 
+def _tell_lost(before: RobotMap, now: RobotMap) -> Iterator[str]:
+    for component in sorted(set(now.components) - set(before.components)):
+        yield f"{now.robot} lost its way: {component_name(now.robot, component)} begins"
+
+
+def _tell_found(before: RobotMap, now: RobotMap) -> Iterator[str]:
+    part_of = {submap.id: submap.component for submap in now.submaps}
+    for component in sorted(set(before.components) - set(now.components)):
+        ids = [s.id for s in before.submaps if s.component == component and s.id in part_of]
+        if ids:
+            name = component_name(now.robot, component)
+            whole = component_name(now.robot, part_of[ids[0]])
+            yield f"{now.robot} found its way: {name} is a part of {whole}"
+
+
+def _pieces(robot_map: RobotMap) -> str:
+    parts = len(robot_map.components)
+    return f" in {parts} components" if parts > 1 else ""
+
+
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def _tell_component(component: JointComponent) -> str:
-    names = " + ".join(sorted(component.robots))
-    return names if len(component.robots) == 1 else f"{names} ({percent(component.confidence)})"

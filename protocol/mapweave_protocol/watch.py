@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -35,6 +36,7 @@ from mapweave_protocol.model import Message
 from mapweave_protocol.queries import JointQuery
 from mapweave_protocol.session import declare_subscriber, open_session
 from mapweave_protocol.story import Story
+from mapweave_protocol.story_joint import tell_components
 
 KEPT_LINES = 20  # of the story stay on the terminal
 POLL = 0.5  # [s]
@@ -122,12 +124,14 @@ def _subscribe(session: zenoh.Session, team: str, inbox: Inbox, stack: ExitStack
 
 
 def _show(story: Story, lines: Sequence[str]) -> Group:
-    """Return the robots as a table, the last lines of the story below it."""
+    """Return the robots as a table, who is together, and the last lines of the story."""
     table = Table("robot", "", "progress", "submaps", "segments", box=None)
     for robot, state in sorted(story.robots.items()):
         here = "[green]here[/]" if state.boot else "[red]gone[/]"
         table.add_row(robot, here, state.progress, str(state.submaps), str(state.segments))
-    return Group(table, "", *(Text(line) for line in lines))
+    joint = story.joint
+    together = f"joint map {joint.version}: {tell_components(joint)}" if joint else ""
+    return Group(table, Text(together), "", *(Text(line) for line in lines))
 
 
 def _run_live(console: Console, watcher: Watcher, story: Iterator[str | None]) -> None:
@@ -135,13 +139,17 @@ def _run_live(console: Console, watcher: Watcher, story: Iterator[str | None]) -
     with Live(console=console, auto_refresh=False) as live:
         for line in story:
             if line is not None:
-                lines.append(line)
+                lines.append(_stamped(line))
             live.update(_show(watcher.story, lines), refresh=True)
 
 
 def _run_plain(console: Console, story: Iterator[str | None]) -> None:
     for line in filter(None, story):
-        console.print(Text(line), soft_wrap=True)
+        console.print(Text(_stamped(line)), soft_wrap=True)
+
+
+def _stamped(line: str) -> str:
+    return f"{time.strftime('%H:%M:%S')} {line}"
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:

@@ -76,8 +76,8 @@ def _run_team(members: list[Member], rate: str) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         store = Path(folder) / "store.sqlite"
         plan = Plan("bench", members, rate, free_endpoint(), store, timeout=None)
-        with Crew(Path(folder)) as crew, Lines(Console()) as display:
-            return run_team(crew, plan, display)
+        with Crew(Path(folder)) as crew:
+            return run_team(crew, plan, Lines(Console()))
 
 
 def _count(outcome: Outcome, member: Member) -> Traffic:

@@ -29,6 +29,13 @@ def test_several_logs_give_a_team_each_robot_with_a_name_and_stretch_of_its_own(
     np.testing.assert_allclose(members[2].truth_pose[:, 0], np.arange(10))
 
 
+def test_a_log_whose_poses_never_change_tells_no_truth(tmp_path: Path) -> None:
+    log = tmp_path / "still.log"
+    log.write_text("".join(f"{HEAD}{' 0' * 11} {k}.0 host {k}.0\n" for k in range(4)))
+    [member] = team_from_logs([log], 1)
+    assert len(member.truth_index) == len(member.truth_pose) == 0
+
+
 def test_a_log_with_fewer_scans_than_robots_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"2 scans, expected at least one for each robot \(3\)"):
         team_from_logs([write_log(tmp_path / "short.log", 2)], 3)

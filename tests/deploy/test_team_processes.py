@@ -96,6 +96,7 @@ def test_interrupted_a_team_stops_all_processes_and_leaves_earlier_results(
         assert team.stderr is not None
         assert team.stderr.read() == "mapweave: interrupted\n"
         assert _nothing_left(groups)
+    assert not list(tmp_path.glob("store-new*"))
     assert [result.read_text() for result in results] == ["earlier"] * 3
 
 
@@ -117,6 +118,7 @@ def test_a_team_out_of_time_says_who_is_not_done(tmp_path: Path) -> None:
     assert told.returncode == 1
     expected = "mapweave: the team was not done within 1 s, still to come: r1, r2\n"
     assert told.stderr == expected
+    assert not list(tmp_path.glob("store*"))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
 from mapweave_deploy.roster import Member
-from mapweave_deploy.verdict import Limits, Verdict, fit, judge
+from mapweave_deploy.verdict import Limits, Verdict, fit, judge, main_component, scan_counts
 
 LIMITS = Limits(0.3, np.radians(3.0))
 
@@ -21,18 +21,21 @@ def drive(rng: np.random.Generator) -> FloatArray:
 
 
 def team(
-    rng: np.random.Generator, error: FloatArray, places: tuple[str, str] = ("x", "x")
+    rng: np.random.Generator,
+    error: FloatArray,
+    places: tuple[str, str] = ("x", "x"),
+    known: slice = slice(None),
 ) -> list[Verdict]:
-    """Judge robots a and b, joined with `error` (3,) in the frame of b."""
+    """Judge robots a and b, joined with `error` (3,) in the frame of b; the truth of `known`."""
     frames = {"a": rng.normal(0, 3, 3), "b": rng.normal(0, 3, 3)}  # in the world
     paths = {robot: drive(rng) for robot in frames}
     world_to_joint = rng.normal(0, 3, 3)
     robots = {f"{robot}/0": se2.compose(world_to_joint, frame) for robot, frame in frames.items()}
     robots["b/0"] = se2.compose(robots["b/0"], error)
     component = JointComponent(robots, 1.0, LineMap.empty(), np.empty(0))
-    index = np.arange(50)
+    index = np.arange(50)[known]
     members = [
-        Member(r, Path("log"), (0, 50), place, index, se2.compose(frames[r], paths[r]))
+        Member(r, Path("log"), (0, 50), place, index, se2.compose(frames[r], paths[r][known]))
         for r, place in zip("ab", places, strict=True)
     ]
     maps = {robot: robot_map(robot, path, rng) for robot, path in paths.items()}
@@ -87,3 +90,27 @@ def test_the_error_of_a_wrong_turn_is_its_angle() -> None:
 def test_robots_in_different_places_cannot_be_joined_rightly() -> None:
     [verdict] = team(np.random.default_rng(4), np.zeros(3), ("x", "y"))
     assert not verdict.right
+
+
+def test_where_no_truth_is_known_a_join_is_not_judged_but_across_places_it_is_wrong() -> None:
+    rng, unknown = np.random.default_rng(5), slice(0)
+    assert team(rng, np.zeros(3), known=unknown) == []
+    [verdict] = team(rng, np.zeros(3), ("x", "y"), known=unknown)
+    assert not verdict.right
+
+
+def test_the_component_with_most_scans_stands_for_a_robot() -> None:
+    parts = [(0, 3), (1, 5), (0, 4)]
+    submaps = tuple(
+        Submap(
+            number,
+            part,
+            np.zeros(3),
+            LineMap.empty(),
+            Trajectory(np.arange(scans), np.zeros(scans), np.zeros((scans, 3))),
+        )
+        for number, (part, scans) in enumerate(parts)
+    )
+    whole = RobotMap("a", "boot", 1, submaps)
+    assert scan_counts(whole) == {"a/0": 7, "a/1": 5}
+    assert main_component(whole) == "a/0"

@@ -1,0 +1,78 @@
+"""What was found about pairs of maps, told once: again only when the decision or reason changes."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from mapweave.confidence import percent
+from mapweave.maps import Alignment, Decision, JointMap
+from mapweave.revocation import objection
+from mapweave_protocol.messages import AlignmentMessage
+
+# Components are numbered from 0 again when a robot starts again: its run tells them apart.
+Pair: TypeAlias = tuple[str, str, str, str]
+_NUMBER = re.compile(r"[0-9]+([.,][0-9]+)?")
+
+
+@dataclass
+class _Told:
+    """What was told last of a pair.
+
+    Attributes
+    ----------
+    gists
+        Of the reasons told for this decision.
+    """
+
+    decision: Decision
+    gists: set[str] = field(default_factory=set)
+
+
+class AlignmentStory:
+    """Tells decisions with their reasons, and which of them the joint map does not rely on."""
+
+    def __init__(self) -> None:
+        self._told: dict[Pair, _Told] = {}
+        self._objections: dict[tuple[str, str], int | None] = {}
+
+    def decided(self, message: AlignmentMessage) -> Iterator[str]:
+        """Tell each decision that is new, or why a pair is not joined if that is new."""
+        runs = message.reference.boot, message.other.boot
+        for alignment in message.unpack():
+            pair = alignment.reference, alignment.other, *runs
+            before = self._told.get(pair)
+            if before is None or before.decision != alignment.decision:
+                self._told[pair] = _Told(alignment.decision, {gist(alignment.reason)})
+                yield _tell(alignment, before.decision if before else None)
+            elif alignment.decision != "accepted" and gist(alignment.reason) not in before.gists:
+                before.gists.add(gist(alignment.reason))
+                yield _tell(alignment, None)
+
+    def judged(self, joint: JointMap) -> Iterator[str]:
+        """Tell each alignment that `joint` is the first not to rely on, or to rely on again."""
+        for alignment in joint.alignments:
+            pair = alignment.reference, alignment.other
+            found = objection(alignment)
+            if found is not None and self._objections.get(pair, -1) != found.revoked:
+                self._objections[pair] = found.revoked
+                what = f"revoked in version {found.revoked}" if found.revoked else "not relied on"
+                yield f"{pair[0]} and {pair[1]}: alignment {what} ({found.reason})"
+            elif found is None and pair in self._objections:
+                del self._objections[pair]
+                if alignment.decision == "accepted":
+                    yield f"{pair[0]} and {pair[1]}: alignment relied on again"
+
+
+def gist(reason: str) -> str:
+    """Return what a reason says at its end, where it differs in kind, whatever its numbers."""
+    return _NUMBER.sub("", reason.rpartition("; ")[2])
+
+
+def _tell(alignment: Alignment, before: Decision | None) -> str:
+    now = {None: "", "accepted": "no longer accepted, "}.get(before, "now ")
+    # That a refused transform is not right needs no figure.
+    refused = alignment.decision == "refused"
+    sure = "" if refused else f", confidence {percent(alignment.confidence)}"
+    names = f"{alignment.reference} and {alignment.other}"
+    return f"{names}: {now}{alignment.decision}{sure} ({alignment.reason})"
