@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeAlias
 
 from mapweave.confidence import percent
@@ -10,8 +10,7 @@ from mapweave.maps import Alignment, Decision, JointMap
 from mapweave.revocation import objection
 from mapweave_protocol.messages import AlignmentMessage
 
-# Components are numbered from 0 again when a robot starts again: its run tells them apart.
-Pair: TypeAlias = tuple[str, str, str, str]
+Runs: TypeAlias = tuple[str, str]  # of the two robots: each numbers its components from 0 again
 _NUMBER = re.compile(r"[0-9]+([.,][0-9]+)?")
 
 
@@ -23,45 +22,65 @@ class _Told:
     ----------
     gists
         Of the reasons told for this decision.
+    runs
+        None where only the joint map told of it.
     """
 
     decision: Decision
-    gists: set[str] = field(default_factory=set)
+    gists: set[str]
+    runs: Runs | None
 
 
 class AlignmentStory:
     """Tells decisions with their reasons, and which of them the joint map does not rely on."""
 
     def __init__(self) -> None:
-        self._told: dict[Pair, _Told] = {}
+        self._told: dict[tuple[str, str], _Told] = {}
         self._objections: dict[tuple[str, str], int | None] = {}
 
     def decided(self, message: AlignmentMessage) -> Iterator[str]:
         """Tell each decision that is new, or why a pair is not joined if that is new."""
         runs = message.reference.boot, message.other.boot
         for alignment in message.unpack():
-            pair = alignment.reference, alignment.other, *runs
-            before = self._told.get(pair)
-            if before is None or before.decision != alignment.decision:
-                self._told[pair] = _Told(alignment.decision, {gist(alignment.reason)})
-                yield _tell(alignment, before.decision if before else None)
-            elif alignment.decision != "accepted" and gist(alignment.reason) not in before.gists:
-                before.gists.add(gist(alignment.reason))
-                yield _tell(alignment, None)
+            yield from self._decided(alignment, runs)
 
     def judged(self, joint: JointMap) -> Iterator[str]:
-        """Tell each alignment that `joint` is the first not to rely on, or to rely on again."""
+        """Tell each alignment that `joint` is the first not to rely on, or to rely on again.
+
+        Those that nobody was heard to decide are told as well: who comes late hears why.
+        """
         for alignment in joint.alignments:
             pair = alignment.reference, alignment.other
             found = objection(alignment)
-            if found is not None and self._objections.get(pair, -1) != found.revoked:
+            if found is None:
+                yield from self._relied_on_again(alignment)
+                if pair not in self._told:
+                    yield from self._decided(alignment, None)
+            elif self._objections.get(pair, -1) != found.revoked:
                 self._objections[pair] = found.revoked
                 what = f"revoked in version {found.revoked}" if found.revoked else "not relied on"
                 yield f"{pair[0]} and {pair[1]}: alignment {what} ({found.reason})"
-            elif found is None and pair in self._objections:
-                del self._objections[pair]
-                if alignment.decision == "accepted":
-                    yield f"{pair[0]} and {pair[1]}: alignment relied on again"
+
+    def _decided(self, alignment: Alignment, runs: Runs | None) -> Iterator[str]:
+        pair, kind = (alignment.reference, alignment.other), gist(alignment.reason)
+        before = self._told.get(pair)
+        if before is not None and before.runs not in (None, runs):
+            before = None
+        if before is None or before.decision != alignment.decision:
+            self._told[pair] = _Told(alignment.decision, {kind}, runs)
+            yield _tell(alignment, before.decision if before else None)
+            return
+        before.runs = runs
+        if alignment.decision != "accepted" and kind not in before.gists:
+            before.gists.add(kind)
+            yield _tell(alignment, None)
+
+    def _relied_on_again(self, alignment: Alignment) -> Iterator[str]:
+        pair = alignment.reference, alignment.other
+        if pair in self._objections:
+            del self._objections[pair]
+            if alignment.decision == "accepted":
+                yield f"{pair[0]} and {pair[1]}: alignment relied on again"
 
 
 def gist(reason: str) -> str:

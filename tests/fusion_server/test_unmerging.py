@@ -108,6 +108,7 @@ def test_a_pair_compared_again_and_refused_comes_apart_and_the_version_says_why(
     lines = [line for joint in (joined, parted) for line in team.story.joined(joint)]
     assert lines == [
         "joint map 1: a/0 + b/0 (90%)",
+        "a/0 and b/0: accepted, confidence 90% (40 m of wall in common)",
         "joint map 2 comes apart: alone: a/0, b/0",
         "a/0 and b/0: alignment revoked in version 2 (only 3 m of wall in common)",
     ]

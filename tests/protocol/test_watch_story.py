@@ -48,6 +48,11 @@ def joint(version: int, *groups: str, sure: float = 0.9) -> JointMap:
     return JointMap(version, tuple(components), ())
 
 
+def judged(version: int, decision: Decision, reason: str) -> JointMap:
+    """Return a version with an alignment of a and b."""
+    return JointMap(version, (), (Alignment("a/0", "b/0", np.zeros(3), decision, 0.9, reason),))
+
+
 def told(story: Story, *joints: JointMap) -> list[str]:
     return [line for version in joints for line in story.joined(version)]
 
@@ -114,8 +119,8 @@ def test_a_join_is_told_when_it_comes_and_when_it_goes_not_when_its_evidence_gro
 
 def test_what_is_found_of_another_run_is_news() -> None:
     story = Story()
-    same = found("refused", "only 2.1 m"), found("refused", "only 2.1 m", boot="z")
-    assert len(decided(story, *same, *same)) == 2
+    one, next_one = (found("refused", "only 2.1 m", boot=boot) for boot in "xz")
+    assert len(decided(story, one, one, next_one, next_one)) == 2
 
 
 @pytest.mark.parametrize(
@@ -184,5 +189,14 @@ def test_an_alignment_relied_on_again_is_told() -> None:
         return JointMap(version, (), (Alignment("a/0", "b/0", np.zeros(3), decision, 0.9, reason),))
 
     told(story, judged(1, "ambiguous", "set aside: 9 m off what a/0-c/0 says"))
+    decided(story, found("accepted", "33 m of wall in common"))
     lines = told(story, *(judged(n, "accepted", "33 m of wall in common") for n in (2, 3)))
     assert lines == ["a/0 and b/0: alignment relied on again"]
+
+
+def test_who_comes_late_hears_the_reasons_from_the_joint_map_once() -> None:
+    story = Story()
+    late = told(story, judged(7, "refused", "only 2.1 m"), judged(8, "refused", "only 2.2 m"))
+    assert late[1:] == ["a/0 and b/0: refused (only 2.1 m)"]
+    assert decided(story, found("refused", "only 2.3 m")) == []
+    assert len(decided(story, found("refused", "only 2.3 m", boot="z"))) == 1
