@@ -1,10 +1,10 @@
 """What happens in a team, told in plain lines; no network and no clock in here."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mapweave.maps import JointMap, RobotMap, component_name
-from mapweave_protocol.messages import AlignmentMessage, StatusMessage
+from mapweave_protocol.messages import AlignmentMessage, MapVersion, StatusMessage
 from mapweave_protocol.story_alignments import AlignmentStory
 from mapweave_protocol.story_joint import JointStory
 
@@ -21,12 +21,15 @@ class RobotState:
         Its last map.
     told
         How many submaps its map had when that was told last.
+    parts
+        The names of all components that the run of `map` has had.
     """
 
     boot: str | None = None
     status: StatusMessage | None = None
     map: RobotMap | None = None
     told: int = 0
+    parts: set[str] = field(default_factory=set)
 
     @property
     def progress(self) -> str:
@@ -90,7 +93,8 @@ class Story:
             yield from _tell_lost(before, robot_map)
             yield from _tell_found(before, robot_map)
         else:
-            state.told = 0
+            state.told, state.parts = 0, set()
+        state.parts |= {component_name(robot_map.robot, c) for c in robot_map.components}
         if state.submaps >= max(2 * state.told, 1):
             state.told = state.submaps
             yield (
@@ -100,12 +104,22 @@ class Story:
 
     def aligned(self, message: AlignmentMessage) -> Iterator[str]:
         """Tell what is new about how two robots' maps lie to each other."""
-        yield from self._alignments.decided(message)
+        past = self._past(message.reference) | self._past(message.other)
+        yield from self._alignments.decided(message, past)
 
     def joined(self, joint: JointMap) -> Iterator[str]:
         """Tell what is new about the joint map, and each join that it is the first not to use."""
         yield from self._joint.changed(joint)
         yield from self._alignments.judged(joint)
+
+    def _past(self, compared: MapVersion) -> set[str]:
+        """Return the parts of a robot that became one with others since they were compared."""
+        state = self._robot(compared.robot)
+        if state.map is None or state.map.boot != compared.boot:
+            return set()
+        if state.map.version < compared.version:
+            return set()
+        return state.parts - {component_name(compared.robot, c) for c in state.map.components}
 
     def _robot(self, robot: str) -> RobotState:
         return self.robots.setdefault(robot, RobotState())

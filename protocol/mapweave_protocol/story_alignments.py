@@ -1,7 +1,7 @@
 """What was found about pairs of maps, told once: again only when the decision or reason changes."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -38,11 +38,15 @@ class AlignmentStory:
         self._told: dict[tuple[str, str], _Told] = {}
         self._objections: dict[tuple[str, str], int | None] = {}
 
-    def decided(self, message: AlignmentMessage) -> Iterator[str]:
-        """Tell each decision that is new, or why a pair is not joined if that is new."""
+    def decided(self, message: AlignmentMessage, past: Set[str]) -> Iterator[str]:
+        """Tell each decision that is new, or why a pair is not joined if that is new.
+
+        Nothing is told of components that are `past`: it is no news of anything there is.
+        """
         runs = message.reference.boot, message.other.boot
         for alignment in message.unpack():
-            yield from self._decided(alignment, runs)
+            if past.isdisjoint({alignment.reference, alignment.other}):
+                yield from self._decided(alignment, runs)
 
     def judged(self, joint: JointMap) -> Iterator[str]:
         """Tell each alignment that `joint` is the first not to rely on, or to rely on again.

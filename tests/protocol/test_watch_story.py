@@ -27,10 +27,10 @@ def robot_map(*components: int, boot: str = "x") -> RobotMap:
     return RobotMap("a", boot, len(submaps), submaps)
 
 
-def found(decision: Decision, reason: str, boot: str = "x") -> AlignmentMessage:
+def found(decision: Decision, reason: str, boot: str = "x", of: str = "a/0") -> AlignmentMessage:
     """Return what was found about robots a and b."""
     a, b = MapVersion(robot="a", boot=boot, version=1), MapVersion(robot="b", boot="y", version=1)
-    alignment = Alignment("a/0", "b/0", np.zeros(3), decision, 0.9, reason)
+    alignment = Alignment(of, "b/0", np.zeros(3), decision, 0.9, reason)
     return AlignmentMessage.pack("a", a, b, [alignment])
 
 
@@ -115,6 +115,17 @@ def test_a_join_is_told_when_it_comes_and_when_it_goes_not_when_its_evidence_gro
         "a/0 and b/0: now accepted, confidence 90%",
         "a/0 and b/0: no longer accepted, ambiguous, confidence 90%",
     ]
+
+
+def test_what_was_found_of_a_part_that_became_one_with_another_is_not_told() -> None:
+    story = Story()
+    for map_ in (robot_map(0), robot_map(0, 1)):
+        list(story.mapped(map_))
+    part = found("refused", "only 2.1 m of wall in common", of="a/1")
+    assert len(decided(story, part)) == 1
+    list(story.mapped(robot_map(0, 0, 0)))
+    assert decided(story, found("accepted", "40 m of wall in common", of="a/1")) == []
+    assert len(decided(story, found("accepted", "40 m of wall in common"))) == 1
 
 
 def test_what_is_found_of_another_run_is_news() -> None:
