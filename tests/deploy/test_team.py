@@ -28,7 +28,7 @@ class Run:
 def run_team(folder: Path, *arguments: str) -> Run:
     """Run a team to its end."""
     done = subprocess.run(
-        [*PROGRAM, "team", *arguments, "--output", str(folder), "--timeout", "300"],
+        [*PROGRAM, "team", *arguments, "--output", str(folder), "--timeout", "900"],
         capture_output=True,
         text=True,
         check=False,
@@ -106,10 +106,20 @@ def test_a_real_log_in_three_stretches_is_joined_and_not_wrongly(
 
 
 @pytest.mark.slow
-def test_robots_in_two_buildings_are_not_joined_across(tmp_path: Path, data_dir: Path) -> None:
-    logs = [str(data_dir / name) for name in ("seattle.log.gz", "intel.log.gz")]
-    run = run_team(tmp_path, *logs, "--robots", "2")
-    first, second = {"r1", "r2"}, {"r3", "r4"}
-    for component in read_joint(run.folder / "joint.json").components:
-        robots = {name.partition("/")[0] for name in component.robots}
-        assert robots <= first or robots <= second
+def test_six_robots_on_four_laps_of_a_building_end_in_one_component(
+    tmp_path: Path, data_dir: Path
+) -> None:
+    run = run_team(tmp_path, str(data_dir / "intel.log.gz"), "--robots", "6")
+    largest = read_joint(run.folder / "joint.json").components[0]
+    assert {f"r{number}/0" for number in range(1, 7)} <= largest.robots.keys()
+    assert "WRONG" not in run.said
+
+
+@pytest.mark.slow
+def test_robots_in_two_buildings_end_in_two_components(tmp_path: Path, data_dir: Path) -> None:
+    logs = [str(data_dir / name) for name in ("intel.log.gz", "seattle.log.gz")]
+    run = run_team(tmp_path, *logs, "--robots", "3")
+    components = read_joint(run.folder / "joint.json").components
+    groups = [{name.partition("/")[0] for name in component.robots} for component in components]
+    assert sorted(groups, key=min) == [{"r1", "r2", "r3"}, {"r4", "r5", "r6"}]
+    assert "WRONG" not in run.said
