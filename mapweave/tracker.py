@@ -7,6 +7,7 @@ Odometry, where a scan has it, is one more prediction beside constant velocity: 
 look first, and what would surprise least, but what was seen decides.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -34,6 +35,7 @@ class TrackerParameters(BaseModel):
     line_spacing: float = Field(0.1, gt=0, description="[m] between points on the map's lines")
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
     max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
+    pace: int = Field(7, ge=1, description="steps whose median is expected next")
     motion_sigma: float = Field(0.5, gt=0, description="[m] of a step against constant velocity")
     turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
     surprise: float = Field(
@@ -57,6 +59,9 @@ class TrackerParameters(BaseModel):
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+    open_novelty: float = Field(
+        0.8, ge=0, le=1, description="what a return at a new place counts along bare walls"
+    )
     open_direction: float = Field(
         0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
     )
@@ -82,6 +87,7 @@ class Tracker:
         self.parameters = parameters or TrackerParameters()
         self.pose: FloatArray = se2.IDENTITY
         self._motion: FloatArray = se2.IDENTITY
+        self._steps: deque[FloatArray] = deque(maxlen=self.parameters.pace)
         self._odometry: FloatArray | None = None
         self._followed = True
         self._local = LocalMap(self.parameters.local_map)
@@ -103,7 +109,7 @@ class Tracker:
         self._followed = tracked is not None
         if tracked is None:
             return None
-        self._motion = se2.between(self.pose, tracked.pose)
+        self._expect(se2.between(self.pose, tracked.pose))
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
         self._local.remember(seen.scan, seen.walls, tracked.pose)
@@ -118,12 +124,19 @@ class Tracker:
         p = self.parameters
         starts = self._local.search(seen.surface.points, near, np.pi)
         found = self._aligned(seen, np.vstack([near, starts]))
-        best = max(found, key=lambda tracked: self._value(tracked, near[None]))
+        best = max(found, key=lambda tracked: self._value(tracked, near[None], p.novelty))
         return best if best.evidence.score >= p.acceptable else None
 
     def forget_motion(self) -> None:
         """Expect the next scan where the last was: what moved in between is unknown."""
         self._motion = se2.IDENTITY
+        self._steps.clear()
+
+    def _expect(self, moved: FloatArray) -> None:
+        """Expect the turn of the last step, and the pace of the last few: some were misjudged."""
+        self._steps.append(moved)
+        pace = np.median([step[:2] for step in self._steps], axis=0)
+        self._motion = np.append(pace, moved[2])
 
     def _locate(self, seen: Observation, known: Callable[[], LineMap]) -> Tracked | None:
         """Try what is likely first, then what shapes propose, then everything within reach."""
@@ -141,7 +154,7 @@ class Tracker:
         found: list[Tracked] = []
         for enough, starts in stages:
             found += [t for t in self._aligned(seen, starts()) if self._is_reached(t)]
-            best = max(found, key=lambda t: self._value(t, predicted), default=None)
+            best = max(found, key=lambda t: self._value(t, predicted, p.novelty), default=None)
             credible = best is not None and self._is_credible(best, predicted)
             if best is not None and credible and best.evidence.score >= enough:
                 return self._slid(seen, best, predicted)
@@ -183,7 +196,7 @@ class Tracker:
         across = directions[:, 1] * (directions[:, 1] @ (tracked.pose - self.pose)[:2])
         starts[:, :2] += across + steps[:, None] * directions[:, 0]
         found = [t for t in self._aligned(seen, starts) if self._is_reached(t)]
-        return max([tracked, *found], key=lambda t: self._value(t, predicted))
+        return max([tracked, *found], key=lambda t: self._value(t, predicted, p.open_novelty))
 
     def _stands_out(self, best: Tracked, found: list[Tracked]) -> bool:
         """Whether a weak pose, as at the edge of the known, has at least no rival."""
@@ -226,10 +239,10 @@ class Tracker:
             for fit, judged in zip(fits, evidence, strict=True)
         ]
 
-    def _value(self, tracked: Tracked, predicted: FloatArray) -> float:
+    def _value(self, tracked: Tracked, predicted: FloatArray, novelty: float) -> float:
         """Evidence less surprise: corridors leave a direction open, and speed is bounded."""
         evidence = tracked.evidence
-        worth = evidence.score + self.parameters.novelty * evidence.novel
+        worth = evidence.score + novelty * evidence.novel
         return worth - self._surprise(tracked, predicted)
 
     def _surprise(self, tracked: Tracked, predicted: FloatArray) -> float:

@@ -72,7 +72,7 @@ def test_an_end_wall_in_sight_holds_a_robot_at_any_speed(step: float, rng: Gener
     It is told from where the robot went by few returns; those far along the walls, metres apart,
     must not outvote them by falling on the same places when nothing moves.
     """
-    assert_followed(drive(ENDS, np.arange(10, 10 + 20 * step, step), rng), 0.15)
+    assert_followed(drive(ENDS, np.arange(10, 10 + 20 * step, step), rng), 0.3)
 
 
 def test_an_end_wall_holds_a_robot_that_changes_its_speed(rng: Generator) -> None:
@@ -91,6 +91,14 @@ def test_a_leap_along_a_corridor_with_doorways_is_found(rng: Generator) -> None:
     steps = np.full(30, 0.3)
     steps[[10, 20]] = 1.4
     assert_followed(drive(DOORWAYS, 14 + np.cumsum(steps), rng), 0.15)
+
+
+def test_where_nothing_tells_a_robot_goes_on_at_its_pace(rng: Generator) -> None:
+    """Past the last doorway two bare walls are all there is, for 25 m."""
+    path = np.arange(26, 68, 0.5)
+    off = drive(DOORWAYS, path, rng)
+    assert np.abs(off[path < 42, 0]).max() < 0.15
+    assert np.abs(off[:, 0]).max() < 0.15 * 25
 
 
 def test_across_a_bare_corridor_a_robot_is_held(rng: Generator) -> None:
