@@ -141,7 +141,7 @@ def try_once(name: str, scans: Sequence[Scan], mapper: Mapper, number: int) -> T
     said = [carried.add(scan) for scan in after_the_jump(scans, start)]
     where = whereabouts(carried.finish())
     errors = off_first_place(where, len(scans), start)
-    bad = [distance > DISTANCE or turn > TURN for _, distance, turn in errors]
+    bad = [bool(distance > DISTANCE or turn > TURN) for _, distance, turn in errors]
     distances = [distance for _, distance, _ in errors]
     return Trial(
         log=name,
