@@ -1,11 +1,12 @@
 """The real logs that are measured on, and what is known of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.readers import read_reference_poses, read_scans
 from mapweave.scan import Scan
@@ -82,9 +83,20 @@ def _is_there(log: Log) -> bool:
     return log.path.is_file()
 
 
-def load_scans(log: Log) -> list[Scan]:
-    """Return all scans of `log`."""
-    return list(read_scans(log.path, on_warning=print))
+def load_scans(log: Log, odometry: str = "none") -> list[Scan]:
+    """Return all scans of `log`; with its own odometry ("prior"), or a random walk ("wrong")."""
+    scans = list(read_scans(log.path, odometry=odometry == "prior", on_warning=print))
+    return wrong_odometry(scans) if odometry == "wrong" else scans
+
+
+def wrong_odometry(scans: Sequence[Scan]) -> list[Scan]:
+    """Return `scans` with odometry that has nothing to do with them: steps of 0.5 m, 0.5 rad."""
+    rng = np.random.default_rng(0)
+    pose, walked = se2.IDENTITY, []
+    for scan in scans:
+        pose = se2.compose(pose, rng.normal(0.0, 0.5, 3))
+        walked.append(replace(scan, odometry=pose))
+    return walked
 
 
 def load_truth(log: Log, stamps: FloatArray) -> FloatArray:

@@ -94,6 +94,12 @@ class Figures:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say which logs, and where results go."""
     parser.add_argument("--logs", nargs="+", metavar="NAME", help="which logs (default all)")
+    parser.add_argument(
+        "--odometry",
+        choices=("none", "prior", "wrong"),
+        default="none",
+        help="none, the log's own (corrected poses, in most logs), or a random walk (%(default)s)",
+    )
     parser.add_argument("--output", type=Path, default=OUTPUT / "map", help="folder (%(default)s)")
 
 
@@ -101,19 +107,19 @@ def run(options: argparse.Namespace) -> None:
     """Map the logs, print the tables, write the maps, their pictures and the figures."""
     figures = []
     for log in find_logs(options.logs):
-        figures.append(_measure(log, options.output))
+        figures.append(_measure(log, options.odometry, options.output))
         write_json(options.output / "figures.json", [asdict(f) for f in figures])
     print(tell(figures))
     print(f"Pictures, maps and figures.json are in {options.output}")
 
 
-def _measure(log: Log, folder: Path) -> Figures:
-    scans = load_scans(log)
+def _measure(log: Log, odometry: str, folder: Path) -> Figures:
+    scans = load_scans(log, odometry)
     made = map_scans(log.name, scans)
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{log.name}.json"
     write_map(file, made.robot_map)
-    draw_map(made.robot_map, folder / f"{log.name}.png", title=f"{log.name}, without odometry")
+    draw_map(made.robot_map, folder / f"{log.name}.png", title=f"{log.name}, odometry: {odometry}")
     merged = merge(made.robot_map)
     draw_joint(
         merged, folder / f"{log.name}-merged.png", {"r1": made.robot_map}, f"{log.name}, merged"
