@@ -1,4 +1,7 @@
-"""Fusion: every pair of stretches of a log, and pairs across buildings: recall and wrong joins."""
+"""Fusion: every pair of stretches of a log, and pairs across buildings: recall and wrong joins.
+
+The peers get the same pairs, side by side.
+"""
 
 import argparse
 import math
@@ -10,6 +13,7 @@ from typing import get_args
 import numpy as np
 
 from mapweave.progress import track
+from tests.benchmarks import peers
 from tests.benchmarks.logs import find_logs
 from tests.benchmarks.pairs import Match, Outcome, Pair, choose_pairs, compare
 from tests.benchmarks.stretches import Stretch, map_stretches
@@ -32,11 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--across", type=int, default=200, metavar="N", help="pairs across buildings at most (200)"
     )
     parser.add_argument("--seed", type=int, default=1, help="draws those pairs (1)")
+    parser.add_argument(
+        "--no-peers", dest="peers", action="store_false", help="mapweave alone, nothing beside it"
+    )
     parser.add_argument("--output", type=Path, default=ROWS, help="rows as JSON (%(default)s)")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Compare all pairs, print the table and every wrong join, write the rows."""
+    """Compare all pairs, print the tables and every wrong join, write the rows."""
     pairs: list[Pair] = []
     logs = find_logs(options.logs)
     for count in options.stretches:
@@ -47,6 +54,9 @@ def run(options: argparse.Namespace) -> None:
         write_json(options.output, [row for pair in pairs for row in _rows(pair)])
     print(tell(pairs))
     print(f"All comparisons are in {options.output}")
+    if options.peers:
+        rows = options.output.with_stem(f"{options.output.stem}-peers")
+        print(peers.tell_beside(pairs, logs, options.stretches, rows))
 
 
 def _tell_maps(stretches: Sequence[Stretch], count: int) -> str:

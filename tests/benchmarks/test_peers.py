@@ -1,5 +1,7 @@
 """The peers get what they need and are judged fairly: mapweave must not look better than it is."""
 
+import argparse
+import json
 import sys
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from mapweave_deploy.arena import arena
 from mapweave_deploy.lidar import LidarParameters, measure
 from mapweave_deploy.office import office
 from mapweave_deploy.world import World
+from tests.benchmarks import fusion
 from tests.benchmarks.logs import Log
 from tests.benchmarks.peer_figures import balanced_threshold, f1, joined, safe_threshold
 from tests.benchmarks.peer_sweep import correlate
@@ -178,3 +181,20 @@ def test_a_peer_whose_package_is_missing_is_left_out_in_one_line_that_names_the_
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2
     assert all("left out" in line and "[peers]" in line for line in lines)
+
+
+@pytest.mark.slow
+def test_the_fusion_benchmark_puts_the_peers_beside_mapweave_on_the_same_pairs(
+    data_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert data_dir.is_dir()
+    parser = argparse.ArgumentParser()
+    fusion.add_arguments(parser)
+    rows = tmp_path / "rows.json"
+    asked = ["--logs", "seattle", "--stretches", "3", "--output", str(rows)]
+    fusion.run(parser.parse_args(asked))
+    told = capsys.readouterr().out
+    assert all(name in told for name in ("mapweave, its own decision", "FFT rotation sweep"))
+    own = {(row["first"], row["second"]) for row in json.loads(rows.read_text())}
+    beside = json.loads((tmp_path / "rows-peers.json").read_text())
+    assert {(row["first"], row["second"]) for row in beside} == own
