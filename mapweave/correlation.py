@@ -138,7 +138,11 @@ def correlate(
 
 
 def _best_shifts(score: FloatArray, size: FloatArray, count: int) -> FloatArray:
-    """(count, 2) shifts [cells] of the highest score; ones beyond `size` (2,) are negative."""
+    """(count, 2) shifts [cells] of the highest score, fewer where there are not as many cells.
+
+    Those beyond `size` (2,) are negative.
+    """
+    count = min(count, score.size)
     best = np.argpartition(score, -count, axis=None)[-count:]
     shift = np.column_stack(np.unravel_index(best, score.shape)).astype(np.float64)
     return np.where(shift > size + 1, shift - score.shape, shift)

@@ -76,3 +76,11 @@ def test_a_larger_map_gets_coarser_cells() -> None:
     whole, half = marks_of(part(BUILDING, 0, 30)), marks_of(part(BUILDING, 10, 30))
     found = correlate(whole, half, np.zeros(1), WEIGHT, few)
     assert np.hypot(*found[:, :2].T).min() < 1.0
+
+
+def test_maps_of_fewer_cells_than_shifts_are_asked_for_get_as_many_as_there_are() -> None:
+    """As where the sensor is covered, and all there is lies within a few centimetres."""
+    stub = marks_of(line_map(np.array([[0.0, 0, 0.2, 0], [0.2, 0, 0.2, 0.2]])))
+    found = correlate(stub, stub, np.zeros(1), WEIGHT, P)
+    assert 0 < len(found) < P.shifts
+    assert np.hypot(*found[:, :2].T).min() < P.cell
