@@ -27,7 +27,9 @@ class IcpParameters(BaseModel):
         0.4, gt=0, description="[m] how far apart opposite normals hold two points, halved"
     )
     start_scale: float = Field(
-        0.35, gt=0, description="[m] residual at which a pair's weight has halved, first iteration"
+        0.35,
+        gt=0,
+        description="[m] residual at which a pair's weight is a quarter, first iteration",
     )
     end_scale: float = Field(0.04, gt=0, description="[m] the same at the end: some 2 sigma (SICK)")
     shrink: float = Field(0.75, gt=0, lt=1, description="of the scale, each iteration")

@@ -45,6 +45,11 @@ class Trajectory:
         """Return a trajectory of no scans."""
         return cls(np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 3)))
 
+    @property
+    def length(self) -> float:
+        """[m] of path, straight from scan to scan."""
+        return float(np.hypot(*np.diff(self.pose[:, :2], axis=0).T).sum())
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineMap:

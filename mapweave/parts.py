@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
-from mapweave.maps import Alignment, LineMap, RobotMap, Submap
+from mapweave.maps import Alignment, LineMap, RobotMap
 
 
 class PartParameters(BaseModel):
@@ -33,7 +33,7 @@ def cut(robot_map: RobotMap, component: int, parameters: PartParameters) -> list
     """Return the parts of `component`, one after the other, in the component's frame."""
     p = parameters
     submaps = [s for s in robot_map.submaps if s.component == component]
-    path = np.array([_path(s) for s in submaps])
+    path = np.array([s.trajectory.length for s in submaps])
     length = max(p.length, float(path.sum()) / p.count)
     part = ((np.cumsum(path) - path / 2) / length).astype(np.int64)
     return [
@@ -76,8 +76,3 @@ def _difference(one: FloatArray, other: FloatArray, middle: FloatArray) -> tuple
     """By how much two transforms (3,) differ at `middle` (2,) [m], [rad]."""
     apart = se2.transform_points(one, middle) - se2.transform_points(other, middle)
     return float(np.hypot(*apart)), float(abs(se2.wrap(one[2] - other[2])))
-
-
-def _path(submap: Submap) -> float:
-    """[m] of path."""
-    return float(np.hypot(*np.diff(submap.trajectory.pose[:, :2], axis=0).T).sum())

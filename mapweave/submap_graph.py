@@ -61,14 +61,14 @@ class SubmapGraph:
         """Note that `submap` followed `previous`, both of one component, by tracking."""
         step = se2.between(previous.pose, submap.pose)
         covariance = _tracking_covariance(previous.trajectory, step, self._parameters)
-        self._trust(Link(previous.id, submap.id, step, covariance, True), path_length(submap))
+        self._trust(Link(previous.id, submap.id, step, covariance, True), submap.trajectory.length)
 
     def join(self, older: Submap, younger: Submap) -> None:
         """Note that two components were joined, at the present poses of these two submaps."""
         p = self._parameters
         covariance = np.diag(np.array([p.joining_sigma, p.joining_sigma, p.joining_turn]) ** 2)
         step = se2.between(older.pose, younger.pose)
-        self._trust(Link(older.id, younger.id, step, covariance, True), path_length(younger))
+        self._trust(Link(older.id, younger.id, step, covariance, True), younger.trajectory.length)
 
     def lengths_from(self, submap: int, count: int) -> FloatArray:
         """(count,) [m] of tracked path by which each submap is known relative to `submap`.
@@ -136,11 +136,6 @@ class SubmapGraph:
         for k, reliable in zip(used, relied.tolist(), strict=True):
             self._relied[k] = reliable
         return [replace(s, pose=poses[index[s.id]]) if moved[s.id] else s for s in submaps]
-
-
-def path_length(submap: Submap) -> float:
-    """Return the length [m] of the path along which `submap` was made."""
-    return float(np.hypot(*np.diff(submap.trajectory.pose[:, :2], axis=0).T).sum())
 
 
 def _tracking_covariance(path: Trajectory, step: FloatArray, p: GraphParameters) -> FloatArray:

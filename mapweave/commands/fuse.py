@@ -79,9 +79,9 @@ def _tell_alignment(alignment: Alignment) -> str:
 
 def _tell_components(joint: JointMap) -> list[str]:
     return [
-        f"component of {', '.join(component.robots)}: {len(component.map.segments)} segments,"
-        f" confidence {percent(component.confidence)}"
-        for component in joint.components
+        f"component of {', '.join(c.robots)}: {len(c.map.segments)} segments,"
+        f" {f'confidence {percent(c.confidence)}' if len(c.robots) > 1 else 'alone'}"
+        for c in joint.components
     ]
 
 

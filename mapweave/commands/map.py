@@ -4,8 +4,6 @@ import argparse
 import sys
 from pathlib import Path
 
-import numpy as np
-
 from mapweave.cli import Command, argument
 from mapweave.errors import FileError
 from mapweave.files import check_outputs, write_map
@@ -69,8 +67,8 @@ def _map_log(log: Path, robot: str, chosen: ScanRange, *, odometry: bool) -> tup
     if not robot_map.submaps:
         raise FileError(
             log,
-            f"none of its {taken} chosen scans can be mapped; expected scans with"
-            " returns, and a range of scans that it has",
+            f"none of its {taken} chosen scans can be mapped; expected scans whose"
+            " returns are dense enough to show walls, and a range of scans that it has",
         )
     return robot_map, taken
 
@@ -84,10 +82,7 @@ def _summary(robot_map: RobotMap, taken: int) -> str:
     for submap in robot_map.submaps:
         sizes[submap.component] += len(submap.trajectory.scan_index)
     segments = sum(len(submap.map.segments) for submap in robot_map.submaps)
-    path = sum(
-        float(np.hypot(*np.diff(submap.trajectory.pose[:, :2], axis=0).T).sum())
-        for submap in robot_map.submaps
-    )
+    path = sum(submap.trajectory.length for submap in robot_map.submaps)
     return (
         f"{sum(sizes.values())} of {taken} scans placed, {max(sizes.values())} in the largest of"
         f" {len(sizes)} components; {path:.0f} m of path, {len(robot_map.submaps)} submaps,"

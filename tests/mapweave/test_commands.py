@@ -273,6 +273,7 @@ def test_maps_that_cannot_all_be_joined_give_status_3_and_the_rest_of_the_work(
     assert (done.returncode, done.stderr) == (3, "")
     for pair in ("a/0 - c/0", "b/0 - c/0"):
         assert re.search(f"^{pair}: (refused|ambiguous) ", done.stdout, re.MULTILINE)
+    assert re.search(r"^component of c/0: \d+ segments, alone$", done.stdout, re.MULTILINE)
     assert [list(c.robots) for c in read_joint(output).components] == [["a/0", "b/0"], ["c/0"]]
 
 
