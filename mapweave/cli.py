@@ -86,7 +86,10 @@ def _overview(points: Sequence[str]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program and return its exit status: 0 done, 1 failed, 2 wrong usage."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    return _report(list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(words: list[str]) -> int:
     points = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
     if words and words[0] == "--version":
         print(f"mapweave {version('mapweave')}")  # noqa: T201
@@ -101,13 +104,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command: Command = points[words[0]].load()
     parser = argparse.ArgumentParser(prog=f"mapweave {words[0]}", description=command.summary)
     command.configure(parser)
-    return _report(command, parser.parse_args(words[1:]))
+    return command.run(parser.parse_args(words[1:]))
 
 
-def _report(command: Command, options: argparse.Namespace) -> int:
-    """Run `command`; the one place where an error becomes a line and an exit status."""
+def _report(words: list[str]) -> int:
+    """Run what `words` ask for; the one place where an error becomes a line and a status."""
     try:
-        return command.run(options)
+        try:
+            return _run(words)
+        finally:
+            sys.stdout.flush()  # in here, where it is no traceback that a reader has gone
     except MapweaveError as error:
         print(f"mapweave: {error}", file=sys.stderr)  # noqa: T201
         return EXIT_FAILED

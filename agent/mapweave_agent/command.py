@@ -76,4 +76,4 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("map the scans of one robot, and compare with its team", _configure, _run)
+command = Command("Map the scans of one robot, and compare with its team.", _configure, _run)

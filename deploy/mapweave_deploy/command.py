@@ -171,4 +171,4 @@ def _say(console: Console, lines: Iterable[str]) -> None:
         console.print(Text(line), soft_wrap=True)
 
 
-command = Command("run a whole team on this machine", configure, run)
+command = Command("Run a whole team on this machine.", configure, run)

@@ -55,4 +55,4 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("coordinate a team: maps and alignments in, joint maps out", _configure, _run)
+command = Command("Coordinate a team: maps and alignments in, joint maps out.", _configure, _run)

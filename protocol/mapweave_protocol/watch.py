@@ -174,4 +174,4 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("show what a team does, as it happens", _configure, _run)
+command = Command("Show what a team does, as it happens.", _configure, _run)

@@ -1,5 +1,7 @@
 """The program finds its subcommands by entry point, and turns errors into a line and a status."""
 
+import os
+import subprocess
 import sys
 from collections.abc import Callable
 from importlib.metadata import entry_points, version
@@ -118,6 +120,17 @@ def test_an_interruption_is_said_and_has_the_shells_status(
     offer("raise KeyboardInterrupt")
     assert main(["try"]) == cli.EXIT_INTERRUPTED == 130
     assert capsys.readouterr().err == "mapweave: interrupted\n"
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["map", "--help"]])
+def test_a_reader_that_has_gone_is_no_traceback(words: list[str]) -> None:
+    """As with ``mapweave --help | head -1``."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    program = [sys.executable, "-m", "mapweave", *words]
+    done = subprocess.run(program, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert done.stderr == ""
 
 
 def test_a_defect_is_not_hidden(offer: Callable[[str], None]) -> None:
