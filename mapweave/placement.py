@@ -6,7 +6,9 @@ wall that is bent, or was seen twice at different places.
 """
 
 import numpy as np
+import shapely
 from pydantic import BaseModel, ConfigDict, Field
+from shapely.geometry.base import BaseGeometry
 
 from mapweave.arrays import BoolArray, FloatArray, IntArray
 from mapweave.directions import line_difference, nearest_direction
@@ -31,6 +33,16 @@ class PlacementParameters(BaseModel):
         0.3, ge=0, description="[m] without evidence that a segment bridges; half a narrow door"
     )
     rounds: int = Field(1, ge=0, description="of fitting")
+    opening_depth: float = Field(
+        0.15, gt=0, description="[m] inside what was seen through, where a wall is doubted"
+    )
+    opening_share: float = Field(
+        0.2,
+        ge=0,
+        le=1,
+        description="of what a segment shows at its median; with less, what was seen through is"
+        " an opening",
+    )
 
 
 def fit(segments: FloatArray, evidence: Evidence, parameters: PlacementParameters) -> FloatArray:
@@ -58,20 +70,28 @@ def follow(
     return np.where(followed[:, None], np.hstack([middle - half, middle + half]), segments)
 
 
-def cut(segments: FloatArray, evidence: Evidence, parameters: PlacementParameters) -> FloatArray:
-    """Return (m, 4) the parts of `segments` [m] on which more evidence lies than close beside."""
+def cut(
+    segments: FloatArray, evidence: Evidence, free: BaseGeometry, parameters: PlacementParameters
+) -> FloatArray:
+    """Return (m, 4) the parts of `segments` [m] on which more evidence lies than close beside.
+
+    In what was seen through, `free`, little evidence is none: there is an open door.
+    """
     p = parameters
     near = Nearness.of(segments, evidence.points, evidence.directions, p.shadow)
     same = _same_face(near, segments, 0.0, p)
-    station = np.floor(near.along / p.station).astype(np.int64)
-    width = int(station.max(initial=0)) + 2
-    key = (near.segment * width + station)[same]
+    place_along = np.floor(near.along / p.station).astype(np.int64)
+    width = int(place_along.max(initial=0)) + 2
+    key = (near.segment * width + place_along)[same]
     on = np.abs(near.across[same]) <= p.tolerance
     weight = evidence.weights[near.sample[same]]
     keys, place = np.unique(key, return_inverse=True)
     balance = np.bincount(place, np.where(on, weight, -weight), minlength=len(keys))
-    kept = keys[balance > 0]
-    return _runs(segments, kept // width, kept % width, p)
+    shown = np.bincount(place, np.where(on, weight, 0.0), minlength=len(keys)).astype(np.float64)
+    found = np.flatnonzero(balance > 0)
+    segment, station = keys[found] // width, keys[found] % width
+    wall = ~_is_opening(segments, segment, station, shown[found], free, p)
+    return _runs(segments, segment[wall], station[wall], p)
 
 
 def trim(
@@ -98,6 +118,29 @@ def trim(
     high = np.maximum(np.clip(high, 0.0, lengths)[:, None], low)
     start = segments[:, :2]
     return np.hstack([start + low * directions, start + high * directions])
+
+
+def _is_opening(
+    segments: FloatArray,
+    segment: IntArray,
+    station: IntArray,
+    shown: FloatArray,
+    free: BaseGeometry,
+    p: PlacementParameters,
+) -> BoolArray:
+    """Return (k,) at which stations there is a hole: seen through, and little is `shown` there.
+
+    Far along a wall the returns are so far apart that a scan draws the wall across an open door.
+    """
+    typical = np.zeros(len(segments))
+    for k in np.unique(segment):
+        typical[k] = np.median(shown[segment == k])
+    weak = shown < p.opening_share * typical[segment]
+    directions, _ = units(segments[segment[weak]])
+    places = segments[segment[weak], :2] + ((station[weak] + 0.5) * p.station)[:, None] * directions
+    opening = np.zeros(len(segment), dtype=np.bool_)
+    opening[weak] = shapely.contains_xy(shapely.buffer(free, -p.opening_depth), *places.T)
+    return opening
 
 
 def _runs(

@@ -72,12 +72,12 @@ def simplify(
     price = p.selection.price * evidence.weights.sum() / max(_wall(merged), 1e-9)
     _, lengths = units(sightings)
     directions = main_directions(sightings, lengths * counts, p.merging.directions)
-    candidates = _placed(merged, evidence, directions, p)
+    candidates = _placed(merged, evidence, directions, free, p)
     chosen = candidates[select(candidates, evidence, price, p.selection)]
     missed = _missed(chosen, sightings, p)
     if missed.any():
         again = _proposed_again(sightings[missed], counts[missed], p)
-        candidates = np.concatenate([candidates, _placed(again, evidence, directions, p)])
+        candidates = np.concatenate([candidates, _placed(again, evidence, directions, free, p)])
         chosen = candidates[select(candidates, evidence, price, p.selection)]
     walls = straighten(_trimmed(chosen, evidence, p), free, p.straightening)
     return meet_walls(join_corners(walls, free, p.joining), free, p.wall_ends)
@@ -105,12 +105,16 @@ def sources(segments: FloatArray, sightings: FloatArray) -> tuple[IntArray, IntA
 
 
 def _placed(
-    segments: FloatArray, evidence: Evidence, directions: FloatArray, p: SimplificationParameters
+    segments: FloatArray,
+    evidence: Evidence,
+    directions: FloatArray,
+    free: BaseGeometry,
+    p: SimplificationParameters,
 ) -> FloatArray:
     """Return the parts of `segments` that lie where most was seen, in main directions if near."""
     fitted = fit(segments, evidence, p.placement)
     straight = follow(fitted, directions, p.merging.direction_tolerance, p.merging.max_shift)
-    placed = cut(straight, evidence, p.placement)
+    placed = cut(straight, evidence, free, p.placement)
     return placed[_is_long(placed, p)]
 
 

@@ -1,6 +1,7 @@
 """Segments lie where most was seen about them, and end where that ends."""
 
 import numpy as np
+import shapely
 from numpy.random import Generator
 
 from mapweave import se2
@@ -11,6 +12,7 @@ from mapweave.selection import SelectionParameters, explained, shadowed
 from tests.mapweave.buildings import random_pose
 
 P = PlacementParameters()
+NOTHING = shapely.Polygon()  # was seen through
 
 
 def seen(segments: list[list[float]], counts: list[int]) -> Evidence:
@@ -52,20 +54,36 @@ def test_a_segment_without_evidence_stays_where_it_is() -> None:
 
 def test_a_wall_drawn_through_a_recess_is_cut_there() -> None:
     evidence = seen([[0, 0, 2, 0], [2, -0.15, 3, -0.15], [3, 0, 5, 0]], [5, 5, 5])
-    parts = cut(np.array([[0.0, 0, 5, 0]]), evidence, P)
+    parts = cut(np.array([[0.0, 0, 5, 0]]), evidence, NOTHING, P)
     np.testing.assert_allclose(parts, [[0, 0, 2, 0], [3, 0, 5, 0]], atol=0.11)
 
 
 def test_a_wall_is_cut_at_a_door_but_not_at_a_lost_beam() -> None:
     door = seen([[0, 0, 2, 0], [2.8, 0, 5, 0]], [5, 5])
     beam = seen([[0, 0, 2, 0], [2.2, 0, 5, 0]], [5, 5])
-    assert len(cut(np.array([[0.0, 0, 5, 0]]), door, P)) == 2
-    assert len(cut(np.array([[0.0, 0, 5, 0]]), beam, P)) == 1
+    assert len(cut(np.array([[0.0, 0, 5, 0]]), door, NOTHING, P)) == 2
+    assert len(cut(np.array([[0.0, 0, 5, 0]]), beam, NOTHING, P)) == 1
+
+
+def test_a_door_that_was_seen_through_stays_open_though_a_grazing_scan_drew_a_wall_there() -> None:
+    """From far along the wall no beam goes through the door; from near by many do."""
+    evidence = seen([[0, 0, 2, 0], [3, 0, 5, 0], [0, 0, 5, 0]], [20, 20, 1])
+    wall, through = np.array([[0.0, 0, 5, 0]]), shapely.box(2.05, -2, 2.95, 2)
+    parts = cut(wall, evidence, through, P)
+    np.testing.assert_allclose(parts, [[0, 0, 2, 0], [3, 0, 5, 0]], atol=0.21)
+    np.testing.assert_allclose(cut(wall, evidence, NOTHING, P), wall)
+
+
+def test_a_wall_that_was_seen_no_oftener_elsewhere_is_kept_where_another_saw_through() -> None:
+    """Free space alone cuts no wall: beams pass beside a wall that is a little askew."""
+    evidence = seen([[0, 0, 5, 0]], [3])
+    wall = np.array([[0.0, 0, 5, 0]])
+    np.testing.assert_allclose(cut(wall, evidence, shapely.box(1, -2, 2, 2), P), wall)
 
 
 def test_the_place_where_a_wall_was_seen_more_often_is_kept_and_the_other_cut() -> None:
     evidence = seen([[0, 0, 5, 0], [0, 0.2, 5, 0.2]], [7, 3])
-    parts = cut(np.array([[0.0, 0, 5, 0], [0.0, 0.2, 5, 0.2]]), evidence, P)
+    parts = cut(np.array([[0.0, 0, 5, 0], [0.0, 0.2, 5, 0.2]]), evidence, NOTHING, P)
     np.testing.assert_allclose(parts, [[0, 0, 5, 0]], atol=1e-9)
 
 
