@@ -56,7 +56,7 @@ class FusionParameters(BaseModel):
     )
     min_confidence: float = Field(0.8, gt=0, lt=1, description="of an accepted alignment")
     max_rival: float = Field(
-        0.6, gt=0, lt=1, description="score of the best different hypothesis, as a share"
+        0.5, gt=0, lt=1, description="score of the best different hypothesis, as a share"
     )
 
 
