@@ -120,11 +120,13 @@ def twins(free: bool) -> tuple[LineMap, LineMap]:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_free_space_makes_the_difference(seed: int) -> None:
-    """The same walls: joined by walls alone, refused once one robot saw through the other's."""
+    """The same walls: a match by walls alone, refused once one robot saw through the other's."""
     by_walls, _ = compared(*twins(free=False), seed)
     by_all, _ = compared(*twins(free=True), seed)
-    assert by_walls.decision == "accepted"
+    assert by_walls.decision != "refused"
+    assert by_walls.confidence > 0.8
     assert by_all.decision == "refused"
+    assert by_all.confidence < 0.2
 
 
 @pytest.mark.parametrize(
