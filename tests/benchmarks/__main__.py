@@ -42,7 +42,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "confidence": fit_confidence,
     "wire": wire,
 }
-USUAL = ("figure2", "map", "fusion")
+USUAL = ("figure2", "map", "kidnap", "fusion")
 
 
 def main() -> None:
@@ -52,7 +52,7 @@ def main() -> None:
     parser = _parser()
     asked = [sys.argv[1:]] if len(sys.argv) > 1 else [[name] for name in USUAL]
     if len(asked) > 1:
-        print(f"{', '.join(USUAL)}: some 20 to 40 minutes on two cores; one alone: name it")
+        print(f"{', '.join(USUAL)}: an hour or more on two cores; one alone: name it")
     for arguments in asked:
         options = parser.parse_args(arguments)
         start = time.monotonic()
