@@ -3,7 +3,7 @@
 Predict, align, and judge by all that both sides saw. Where the predicted pose does not convince,
 every motion in a window is searched; where that does not convince either, the scan is not placed.
 
-Odometry, where a scan has it, is one more prediction beside constant velocity: it may say where to
+Odometry, where a scan has it, is one more prediction beside the present pace: it may say where to
 look first, and what would surprise least, but what was seen decides.
 """
 
@@ -36,7 +36,7 @@ class TrackerParameters(BaseModel):
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
     max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
     pace: int = Field(7, ge=1, description="steps whose median is expected next")
-    motion_sigma: float = Field(0.5, gt=0, description="[m] of a step against constant velocity")
+    motion_sigma: float = Field(0.5, gt=0, description="[m] of a step against the predicted one")
     turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
     surprise: float = Field(
         0.02, ge=0, description="share of returns that a step e sigma² off is worth less"
@@ -171,7 +171,7 @@ class Tracker:
         return tracked.evidence.score >= p.convincing or doubt <= p.max_doubt
 
     def _predictions(self, scan: Scan) -> FloatArray:
-        """(k, 3) where the robot may be by now: by its odometry, and at constant velocity."""
+        """(k, 3) where the robot may be by now: by its odometry, and at its pace."""
         steps = [self._motion]
         if scan.odometry is not None and self._odometry is not None:
             steps.insert(0, se2.between(self._odometry, scan.odometry))
