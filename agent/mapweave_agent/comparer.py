@@ -4,24 +4,20 @@ A thread would not do: hypothesis and verification are many small numpy operatio
 Python's lock most of the time.
 """
 
-import multiprocessing
-import os
-import signal
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import TypeAlias
 
 from mapweave.maps import Alignment, RobotMap
 from mapweave_agent.comparing import Comparison
+from mapweave_agent.worker import Worker, answer
 
 Aligner: TypeAlias = Callable[[RobotMap, RobotMap], Sequence[Alignment]]
 
 NICENESS = 10  # mapping comes first where processors are few
-_SPAWN = multiprocessing.get_context("spawn")  # a forked Zenoh session hangs
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +40,7 @@ class Outcome:
     failure: str = ""
 
 
-class Comparer:
+class Comparer(Worker):
     """Does one comparison at a time; a context manager that ends its process.
 
     Parameters
@@ -54,30 +50,9 @@ class Comparer:
     """
 
     def __init__(self, align: Aligner) -> None:
-        self._align = align
+        super().__init__(_serve, align)
         self._comparison: Comparison | None = None
         self._started = 0.0
-        self._start_process()
-
-    def __enter__(self) -> "Comparer":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._process.terminate()
-        self._process.join()
-        self._pipe.close()
-
-    @property
-    def pid(self) -> int:
-        """Of the process that compares."""
-        pid = self._process.pid
-        assert pid is not None  # it was started
-        return pid
 
     @property
     def busy(self) -> bool:
@@ -111,25 +86,10 @@ class Comparer:
             return Outcome(comparison, None, took, failure)
         return Outcome(comparison, alignments, took, failure)
 
-    def _start_process(self) -> None:
-        self._pipe, theirs = _SPAWN.Pipe()
-        self._process = _SPAWN.Process(target=_serve, args=(theirs, self._align), daemon=True)
-        self._process.start()
-        # Only the process holds its end now: each side sees when the other one is gone.
-        theirs.close()
-
 
 def _serve(pipe: Connection, align: Aligner) -> None:
     """Compare what comes through `pipe` until its other end is closed."""
-    # Ctrl-C goes to the whole group; the agent ends this process itself.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(NICENESS)
-    while True:
-        try:
-            reference, other = pipe.recv()
-        except EOFError:
-            return
-        pipe.send(_compare(align, reference, other))
+    answer(pipe, NICENESS, lambda maps: _compare(align, *maps))
 
 
 def _compare(

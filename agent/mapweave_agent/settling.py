@@ -5,53 +5,25 @@ is that of `mapweave map`, whatever the processors were busy with.
 """
 
 import logging
-import multiprocessing
-import os
-import signal
 from multiprocessing.connection import Connection
-from types import TracebackType
 
 from mapweave.settling import Finished, Settled, Settler, SettlingParameters
+from mapweave_agent.worker import Worker, answer
 
 NICENESS = 5  # tracking comes first where processors are few
-_SPAWN = multiprocessing.get_context("spawn")  # a forked Zenoh session hangs
 
 _log = logging.getLogger(__name__)
 
 
-class SettlingProcess:
+class SettlingProcess(Worker):
     """A `mapweave.settling.Settling`; a context manager that ends its process.
 
     If the process is gone, it is said once, and submaps stay as they were tracked.
     """
 
     def __init__(self, parameters: SettlingParameters) -> None:
-        self._pipe, theirs = _SPAWN.Pipe()
-        self._process = _SPAWN.Process(target=_serve, args=(theirs, parameters), daemon=True)
-        self._process.start()
-        # Only the process holds its end now: each side sees when the other one is gone.
-        theirs.close()
+        super().__init__(_serve, parameters)
         self._ended = False
-
-    def __enter__(self) -> "SettlingProcess":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._process.terminate()
-        self._process.join()
-        self._pipe.close()
-
-    @property
-    def pid(self) -> int:
-        """Of the process."""
-        pid = self._process.pid
-        assert pid is not None  # it was started
-        return pid
 
     def begin(self, finished: Finished) -> None:
         """Hand the next submap over."""
@@ -84,13 +56,4 @@ class SettlingProcess:
 
 def _serve(pipe: Connection, parameters: SettlingParameters) -> None:
     """Settle what comes through `pipe` until its other end is closed."""
-    # Ctrl-C goes to the whole group; the agent ends this process itself.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(NICENESS)
-    settler = Settler(parameters)
-    while True:
-        try:
-            finished = pipe.recv()
-        except EOFError:
-            return
-        pipe.send(settler.settle(finished))
+    answer(pipe, NICENESS, Settler(parameters).settle)

@@ -1,0 +1,68 @@
+"""A process beside the agent's own: what takes long must not hold tracking up."""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Any, Self
+
+_SPAWN = multiprocessing.get_context("spawn")  # a forked Zenoh session hangs
+
+
+class Worker:
+    """A process that answers through a pipe; a context manager that ends it.
+
+    Parameters
+    ----------
+    serve
+        What the process runs, given its end of the pipe and `argument`; at the top of a module.
+    """
+
+    def __init__(self, serve: Callable[[Connection, Any], None], argument: object) -> None:
+        self._serve = serve
+        self._argument = argument
+        self._start_process()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._process.terminate()
+        self._process.join()
+        self._pipe.close()
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        pid = self._process.pid
+        assert pid is not None  # it was started
+        return pid
+
+    def _start_process(self) -> None:
+        self._pipe, theirs = _SPAWN.Pipe()
+        self._process = _SPAWN.Process(
+            target=self._serve, args=(theirs, self._argument), daemon=True
+        )
+        self._process.start()
+        # Only the process holds its end now: each side sees when the other one is gone.
+        theirs.close()
+
+
+def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None:
+    """Answer what comes through `pipe`, by `of`, until its other end is closed."""
+    # Ctrl-C goes to the whole group; the agent ends this process itself.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(niceness)
+    while True:
+        try:
+            asked = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(of(asked))
