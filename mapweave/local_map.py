@@ -98,6 +98,13 @@ class LocalMap:
         self._target: Target | None = None
         self._raster: NearnessRaster | None = None
 
+    def copy(self) -> "LocalMap":
+        """Return one that remembers by itself from now on."""
+        other = LocalMap(self._parameters)
+        other._keyframes = self._keyframes.copy()
+        other._target, other._raster = self._target, self._raster
+        return other
+
     @property
     def is_empty(self) -> bool:
         """Whether nothing was remembered yet."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
+from mapweave.acceptance import Tracked
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
 from mapweave.maps import LineMap, RobotMap, Submap
@@ -17,7 +18,7 @@ from mapweave.observation import Observation, ObservationParameters, observe
 from mapweave.scan import Scan
 from mapweave.settling import Finished, Settler, Settling, SettlingParameters
 from mapweave.submap import GrowingSubmap
-from mapweave.tracker import Tracked, Tracker, TrackerParameters
+from mapweave.tracker import Found, Tracker, TrackerParameters
 from mapweave.uncertainty import UncertaintyParameters, pose_uncertainty, turn_uncertainty
 
 
@@ -86,7 +87,6 @@ class Mapper:
         self._growing = GrowingSubmap(self.parameters.settling.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
-        self._waiting: list[Observation] = []
         self._settling = settling or Settler(self.parameters.settling)
         self._unsettled = False  # whether the last finished submap is being settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
@@ -100,16 +100,15 @@ class Mapper:
         finished = len(self._finished)
         lost = False
         placed = self._place(seen)
-        if not placed:
-            self._waiting.append(seen)
-            if len(self._waiting) >= self.parameters.patience:
-                self._start_again()
-                lost = True
-                placed = seen not in self._waiting
+        if len(self._tracker.missed) >= self.parameters.patience:
+            self._start_again()
+            lost = True
+            placed = seen.scan.index in self._merged
         return Placement(placed, self._component, len(self._finished) > finished, lost)
 
     def finish(self) -> RobotMap:
         """Finish the growing submap, as at the end of a log, and return the map."""
+        self._merge_all(self._tracker.settle())
         if not self._growing.is_empty:
             self._finish_submap()
         self._adopt_settled()
@@ -121,13 +120,14 @@ class Mapper:
         return RobotMap(self.robot, self.boot, self._version, (*self._finished, *growing))
 
     def _place(self, seen: Observation) -> bool:
-        tracked = self._tracker.place(seen, self._known)
-        if tracked is None:
-            self._tracker.forget_motion()
-            return False
-        self._merge(seen, tracked)
-        self._place_waiting()
-        return True
+        """Follow the robot to a scan; merge it, and those missed before it."""
+        found = self._tracker.place(seen, self._known)
+        self._merge_all(found)
+        return any(each is seen for each, _ in found)
+
+    def _merge_all(self, found: Found) -> None:
+        for seen, tracked in found:
+            self._merge(seen, tracked)
 
     def _known(self) -> LineMap:
         """G_(t-1): the lines around the robot, tracker's frame."""
@@ -140,19 +140,9 @@ class Mapper:
         ]
         return unite_lines(last + growing)
 
-    def _place_waiting(self) -> None:
-        """Try the scans that wait once more, from the one next to the known pose backwards."""
-        pose = self._tracker.pose
-        for seen in reversed(self._waiting):
-            tracked: Tracked | None = self._tracker.revisit(seen, pose)
-            if tracked is not None:
-                self._merge(seen, tracked)
-                pose = tracked.pose
-        self._waiting.clear()
-
     def _start_again(self) -> None:
         """Begin a new component with the scans that wait; they fit each other or wait on."""
-        waiting, self._waiting = self._waiting, []
+        waiting = self._tracker.missed
         if not self._growing.is_empty:
             self._finish_submap()
         if any(s.component == self._component for s in self._finished):
@@ -163,8 +153,7 @@ class Mapper:
         self._tracker = Tracker(self.parameters.tracker)
         self._origin = self._frame = se2.IDENTITY
         for seen in waiting:
-            if not self._place(seen):
-                self._waiting.append(seen)
+            self._place(seen)
 
     def _merge(self, seen: Observation, tracked: Tracked) -> None:
         """Merge a scan where it was found, tracker's frame, into the growing submap."""

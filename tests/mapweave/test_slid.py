@@ -49,9 +49,9 @@ def drive(outline: FloatArray, path: FloatArray, noise: Generator) -> FloatArray
 
 
 def placed(tracker: Tracker, scan: Scan) -> FloatArray:
-    tracked = tracker.place(observe(scan, ObservationParameters()), LineMap.empty)
-    assert tracked is not None, f"scan {scan.index} was not placed"
-    return tracked.pose
+    found = tracker.place(observe(scan, ObservationParameters()), LineMap.empty)
+    assert len(found) == 1, f"scan {scan.index} was not placed"
+    return found[0][1].pose
 
 
 def assert_followed(off: FloatArray, most: float) -> None:

@@ -5,11 +5,12 @@ import pytest
 from numpy.random import Generator
 
 from mapweave import se2
+from mapweave.acceptance import Tracked
 from mapweave.arrays import FloatArray
 from mapweave.maps import LineMap
 from mapweave.observation import Observation, ObservationParameters, observe
 from mapweave.scan import Scan
-from mapweave.tracker import Tracked, Tracker
+from mapweave.tracker import Tracker
 from tests.mapweave.buildings import (
     BUILDING,
     FRONT,
@@ -27,8 +28,15 @@ def observed(scan: Scan) -> Observation:
     return observe(scan, ObservationParameters())
 
 
+def placed(tracker: Tracker, scan: Scan) -> Tracked | None:
+    """Return what became of `scan` at once; None where it is missed or on probation."""
+    seen = observed(scan)
+    found = tracker.place(seen, LineMap.empty)
+    return next((tracked for each, tracked in found if each is seen), None)
+
+
 def tracked_along(tracker: Tracker, scans: list[Scan]) -> list[Tracked | None]:
-    return [tracker.place(observed(scan), LineMap.empty) for scan in scans]
+    return [placed(tracker, scan) for scan in scans]
 
 
 def errors(found: list[Tracked | None], true: FloatArray) -> FloatArray:
@@ -40,7 +48,7 @@ def errors(found: list[Tracked | None], true: FloatArray) -> FloatArray:
 
 def test_the_first_scan_defines_the_frame() -> None:
     tracker = Tracker()
-    first = tracker.place(observed(cast(WALLS, [9, 1, 0.3])), LineMap.empty)
+    first = placed(tracker, cast(WALLS, [9, 1, 0.3]))
     assert first is not None
     np.testing.assert_array_equal(first.pose, np.zeros(3))
     assert first.evidence.score == 1.0
@@ -72,18 +80,18 @@ def test_a_scan_of_another_place_is_not_placed(rng: Generator) -> None:
     tracked_along(tracker, scans)
     before = tracker.pose
     elsewhere = cast(walls_of(OTHER_BUILDING), [9, -3, 0.5], noise=rng)
-    assert tracker.place(observed(elsewhere), LineMap.empty) is None
+    assert placed(tracker, elsewhere) is None
     np.testing.assert_array_equal(tracker.pose, before)
 
 
 @pytest.mark.parametrize("seen", [0, 15])
 def test_a_scan_that_shows_too_little_is_blind_and_not_placed(seen: int) -> None:
     ranges = np.where(np.arange(len(FRONT)) < seen, 2.0, np.nan)
-    blind = observed(Scan(0, 0.0, FRONT, ranges))
+    blind = Scan(0, 0.0, FRONT, ranges)
     tracker = Tracker()
-    assert tracker.is_blind(blind)
-    assert tracker.place(blind, LineMap.empty) is None
-    sighted = tracker.place(observed(cast(WALLS, [9, 1, 0])), LineMap.empty)
+    assert tracker.is_blind(observed(blind))
+    assert placed(tracker, blind) is None
+    sighted = placed(tracker, cast(WALLS, [9, 1, 0]))
     assert sighted is not None and (sighted.pose == 0).all()  # the blind one left no trace
 
 
@@ -101,12 +109,12 @@ def test_evidence_counts_for_and_against() -> None:
     """Walls seen before explain a scan; a wall that went through free space is held against it."""
     tracker = Tracker()
     tracked_along(tracker, [cast(WALLS, [9, 1.0, 0]), cast(WALLS, [9.4, 1.0, 0])])
-    again = tracker.place(observed(cast(WALLS, [9.2, 1.0, 0])), LineMap.empty)
+    again = placed(tracker, cast(WALLS, [9.2, 1.0, 0]))
     assert again is not None
     assert again.evidence.explained > 0.95
     assert again.evidence.contradicted == pytest.approx(0, abs=0.01)
     box = np.array([[11.0, 1.4, 11, 0.6]])  # faces the robot, in the middle of the corridor
-    blocked = tracker.place(observed(cast(np.vstack([WALLS, box]), [9.2, 1, 0])), LineMap.empty)
+    blocked = placed(tracker, cast(np.vstack([WALLS, box]), [9.2, 1, 0]))
     assert blocked is not None
     assert blocked.evidence.contradicted > 0.05
     assert blocked.evidence.score < again.evidence.score - 0.05
@@ -125,3 +133,49 @@ def test_an_older_scan_is_placed_without_moving_the_track(rng: Generator) -> Non
     off = se2.between(se2.between(true[0], place), found.pose)
     assert np.hypot(off[0], off[1]) < 0.1 and abs(off[2]) < 0.02
     np.testing.assert_array_equal(tracker.pose, before)
+
+
+def passer_by(pose: list[float], rng: Generator) -> Scan:
+    """Return a scan in which somebody stands close before the robot and hides most of it."""
+    scan = cast(WALLS, pose, noise=rng)
+    near = np.where(np.abs(FRONT) < np.radians(60), 0.6, scan.ranges)
+    return Scan(0, 0.0, FRONT, near)
+
+
+def test_a_scan_that_people_hide_costs_neither_it_nor_the_way_on(rng: Generator) -> None:
+    """The next ones fit where the robot went meanwhile; two of them are believed."""
+    way = [[x, 1.0, 0.0] for x in np.arange(4, 11, 0.5)]
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, pose, noise=rng) for pose in way[:10]])
+    assert placed(tracker, passer_by(way[10], rng)) is None
+    on_probation = cast(WALLS, way[11], noise=rng)
+    assert tracker.place(observed(on_probation), LineMap.empty) == []
+    found = tracker.place(observed(cast(WALLS, way[12], noise=rng)), LineMap.empty)
+    assert len(found) >= 2  # it, the one before, and the hidden one where that can be made out
+    np.testing.assert_allclose(tracker.pose[:2], [way[12][0] - way[0][0], 0], atol=0.1)
+
+
+def test_a_scan_on_probation_that_the_next_one_does_not_confirm_leaves_no_trace(
+    rng: Generator,
+) -> None:
+    way = [[x, 1.0, 0.0] for x in np.arange(4, 11, 0.5)]
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, pose, noise=rng) for pose in way[:10]])
+    before = tracker.pose
+    away = [cast(walls_of(OTHER_BUILDING), [9, -3, 0.5], noise=rng) for _ in range(2)]
+    assert placed(tracker, away[0]) is None
+    assert tracker.place(observed(cast(WALLS, way[11], noise=rng)), LineMap.empty) == []
+    assert placed(tracker, away[1]) is None
+    assert len(tracker.missed) == 3
+    np.testing.assert_array_equal(tracker.pose, before)
+
+
+def test_at_the_end_the_scan_on_probation_is_believed(rng: Generator) -> None:
+    way = [[x, 1.0, 0.0] for x in np.arange(4, 11, 0.5)]
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, pose, noise=rng) for pose in way[:10]])
+    placed(tracker, passer_by(way[10], rng))
+    last = observed(cast(WALLS, way[11], noise=rng))
+    assert tracker.place(last, LineMap.empty) == []
+    assert any(seen is last for seen, _ in tracker.settle())
+    assert tracker.settle() == []

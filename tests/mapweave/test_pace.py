@@ -1,0 +1,81 @@
+"""What a robot did when it turned like that is what it is expected to do again."""
+
+import numpy as np
+import pytest
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.pace import Pace, PaceParameters
+
+HELD = np.diag([20.0, 20.0, 20.0])
+BARE = np.diag([0.1, 80.0, 20.0])  # along x nothing holds
+STRAIGHT, ON_THE_SPOT = np.array([0.5, 0.0, 0.01]), np.array([0.05, 0.02, 0.35])
+
+
+def paced(*steps: FloatArray, information: FloatArray = HELD) -> Pace:
+    pace = Pace(PaceParameters())
+    for step in steps:
+        pace.add(step, information)
+    return pace
+
+
+def test_nothing_is_expected_of_a_robot_that_has_not_moved() -> None:
+    pace = Pace(PaceParameters())
+    np.testing.assert_array_equal(pace.guesses(), [se2.IDENTITY])
+    assert pace.surprise(np.array([1.0, 0, 0])) == pace.leap(np.array([1.0, 0, 0])) > 0
+
+
+def test_a_way_goes_with_its_turn() -> None:
+    """Logs are thinned by way and turn: half a metre, or 20 degrees on the spot."""
+    pace = paced(*[STRAIGHT, ON_THE_SPOT] * 12)
+    np.testing.assert_allclose(pace.way(0.0)[0], STRAIGHT[:2])
+    np.testing.assert_allclose(pace.way(0.35)[0], ON_THE_SPOT[:2])
+
+
+def test_to_the_other_side_a_robot_turns_alike() -> None:
+    pace = paced(*[ON_THE_SPOT] * 12)
+    np.testing.assert_allclose(pace.way(-0.35)[0], ON_THE_SPOT[:2] * [1, -1])
+
+
+def test_who_keeps_the_pace_surprises_more_by_leaving_it(rng: np.random.Generator) -> None:
+    steady = paced(*[STRAIGHT] * 30)
+    erratic = paced(*STRAIGHT + rng.normal(0, [0.3, 0.3, 0.01], (60, 3)))
+    leap = np.array([1.2, 0.0, 0.0])
+    assert steady.surprise(leap) > 1.5 * erratic.surprise(leap)
+    assert steady.leap(leap) < steady.surprise(leap)
+    assert steady.surprise(STRAIGHT) < 1e-3
+
+
+def test_steps_along_bare_walls_teach_nothing() -> None:
+    """They are where they were expected; who believed them would never find out otherwise."""
+    pace = paced(*[STRAIGHT] * 20)
+    for _ in range(40):
+        pace.add(np.array([0.0, 0.0, 0.01]), BARE)
+    np.testing.assert_allclose(pace.way(0.0)[0], STRAIGHT[:2])
+
+
+@pytest.mark.parametrize("missed", [1, 3])
+def test_while_scans_are_missed_a_robot_goes_on_or_stops(missed: int) -> None:
+    pace = paced(*[np.array([0.5, 0.0, 0.0])] * 12)
+    gone, stopped = pace.guesses(missed)
+    np.testing.assert_allclose(gone, [0.5 * (missed + 1), 0, 0])
+    np.testing.assert_array_equal(stopped, se2.IDENTITY)
+    assert pace.surprise(gone, missed) == pace.surprise(stopped, missed) == 0
+    assert pace.surprise(np.array([-1.0, 0.0, 0.0]), missed) > 0
+
+
+def test_odometry_is_one_more_guess() -> None:
+    pace = paced(*[STRAIGHT] * 12)
+    told = np.array([0.0, 0.0, 1.0])
+    np.testing.assert_array_equal(pace.guesses(told=told)[0], told)
+    assert pace.surprise(told, told=told) == 0 < pace.surprise(told)
+    assert pace.surprise(STRAIGHT, told=told) < 1e-3
+
+
+def test_a_copy_goes_on_by_itself() -> None:
+    pace = paced(*[STRAIGHT] * 12)
+    other = pace.copy()
+    for _ in range(8):
+        other.add(np.array([0.9, 0.0, 0.01]), HELD)
+    np.testing.assert_allclose(pace.way(0.0)[0], STRAIGHT[:2])
+    np.testing.assert_allclose(other.way(0.0)[0], [0.9, 0.0])
