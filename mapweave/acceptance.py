@@ -38,6 +38,9 @@ class AcceptanceParameters(BaseModel):
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+    held: float = Field(
+        3.0, gt=0, description="points that hold a pose in every direction, after a miss"
+    )
     expected: float = Field(0.02, ge=0, description="surprise up to which a pose is expected")
     expected_dispute: float = Field(0.15, ge=0, description="disputed share of one, at most")
 
@@ -74,6 +77,11 @@ def is_credible(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
     p = parameters
     doubt = tracked.evidence.disputed + p.leap * tracked.surprise
     return tracked.evidence.score >= p.convincing or doubt <= p.max_doubt
+
+
+def is_held(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
+    """Whether a pose is held in every direction: along bare walls, look-alikes fit as well."""
+    return bool(np.linalg.eigvalsh(tracked.information[:2, :2])[0] >= parameters.held)
 
 
 def is_acceptable(

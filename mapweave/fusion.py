@@ -98,25 +98,25 @@ class _Component:
     def __init__(self, robot_map: RobotMap, number: int, p: FusionParameters) -> None:
         self._robot_map, self._number, self._p = robot_map, number, p
         self.name = component_name(robot_map.robot, number)
-        self.whole = _shape(assemble(robot_map, number), p)
+        self.whole = prepare(assemble(robot_map, number), p)
 
     @cached_property
     def parts(self) -> list[Shape]:
         """Those with enough wall to compare."""
         cuts = cut(self._robot_map, self._number, self._p.parts)
-        shapes = [_shape(lines, self._p) for lines in cuts] if len(cuts) > 1 else [self.whole]
+        shapes = [prepare(lines, self._p) for lines in cuts] if len(cuts) > 1 else [self.whole]
         return [shape for shape in shapes if shape is not None]
 
 
 def _align(first: _Component, second: _Component, p: FusionParameters) -> Alignment:
     """Compare two components; in parts, where as wholes they cannot be joined: they may be bent."""
-    whole = _compare(first.name, first.whole, second.name, second.whole, p)
+    whole = compare(first.name, first.whole, second.name, second.whole, p)
     if whole.decision == "accepted":
         return whole
     pairs = list(itertools.product(first.parts, second.parts))
     if len(pairs) < 2:
         return whole
-    found = [(_compare(first.name, a, second.name, b, p), b) for a, b in pairs]
+    found = [(compare(first.name, a, second.name, b, p), b) for a, b in pairs]
     joined = [
         (x, b.raster.surface.points.mean(axis=0)) for x, b in found if x.decision == "accepted"
     ]
@@ -131,22 +131,35 @@ def align_maps(
     """Find the transform from `other` to `reference`, each a component's name and its lines."""
     p = parameters or FusionParameters()
     (a, first), (b, second) = reference, other
-    return _compare(a, _shape(first, p), b, _shape(second, p), p)
+    return compare(a, prepare(first, p), b, prepare(second, p), p)
 
 
-def _shape(lines: LineMap, p: FusionParameters) -> Shape | None:
-    """Prepare `lines`; None where there is too little wall to compare."""
+def prepare(lines: LineMap, p: FusionParameters) -> Shape | None:
+    """Return what comparing `lines` takes; None where there is too little wall to compare."""
     wall = np.hypot(*(lines.segments[:, 2:] - lines.segments[:, :2]).T).sum()
     return Shape.of(lines, p.hypotheses, p.raster) if wall >= p.min_wall else None
 
 
-def _compare(
-    a: str, first: Shape | None, b: str, second: Shape | None, p: FusionParameters
+def compare(
+    a: str,
+    first: Shape | None,
+    b: str,
+    second: Shape | None,
+    p: FusionParameters,
+    possible: FloatArray | None = None,
 ) -> Alignment:
+    """Find the transform from `second`, called `b`, to `first`, called `a`, both prepared.
+
+    Parameters
+    ----------
+    possible
+        (n, 3) transforms of which one is near the right one, if that is known; without it, shapes
+        propose.
+    """
     if first is None or second is None:
         poor = a if first is None else b
         return _no_alignment(a, b, f"{poor} has less than {p.min_wall:g} m of wall to compare")
-    ranked = find_alignments(first, second, p)
+    ranked = find_alignments(first, second, p, possible)
     if not ranked:
         return _no_alignment(a, b, "no part of one has the shape of a part of the other")
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
@@ -164,9 +177,11 @@ def _compare(
     )
 
 
-def find_alignments(first: Shape, second: Shape, p: FusionParameters) -> list[Hypothesis]:
+def find_alignments(
+    first: Shape, second: Shape, p: FusionParameters, possible: FloatArray | None = None
+) -> list[Hypothesis]:
     """Return the hypotheses that differ, best first; none where no shape proposes any."""
-    transforms, _ = hypothesise(first, second, p.hypotheses, p.verification)
+    transforms, _ = hypothesise(first, second, p.hypotheses, p.verification, possible)
     if len(transforms) == 0:
         return []
     aligned = _refined(first, second, transforms, p)

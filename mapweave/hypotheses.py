@@ -71,14 +71,21 @@ def hypothesise(
     other: Shape,
     parameters: HypothesisParameters,
     verification: VerificationParameters,
+    proposals: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return (k, 3) transforms from `other` to `reference`, and their (k,) coarse scores [m].
 
     Best first; any two differ by more than `parameters.distance` or `parameters.turn`, measured
     at the middle of `other`.
+
+    Parameters
+    ----------
+    proposals
+        (n, 3) all that is possible, where that is known; without it, shapes propose.
     """
     p = parameters
-    proposals = _proposals(reference, other, p, verification)
+    if proposals is None:
+        proposals = _proposals(reference, other, p, verification)
     middle = other.raster.surface.points.mean(axis=0)
     rough = coarse_scores(
         reference.raster, other.raster, proposals, p.proposal_samples, verification

@@ -1,6 +1,8 @@
 """Lost and found: a robot's components are joined as soon as their shapes prove it (paper, II).
 
-By the means by which two robots' maps are joined: a component is a map like any other.
+By the means by which two robots' maps are joined: a component is a map like any other. But most
+robots that lost track were not carried away. Where the shapes leave it open, a component is looked
+for where the robot was when it lost track of the one before; what both saw decides as ever.
 """
 
 import math
@@ -8,24 +10,51 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
+from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
-from mapweave.fusion import FusionParameters, align_maps
-from mapweave.maps import LineMap, Submap
+from mapweave.fusion import FusionParameters, compare, prepare
+from mapweave.hypotheses import Shape
+from mapweave.maps import Alignment, Submap
 
-GROWTH = 0.15  # share by which either of two components has grown before they are compared again
+
+class ReunionParameters(BaseModel):
+    """When components are compared, and where a robot that lost track is looked for."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    fusion: FusionParameters = FusionParameters()
+    growth: float = Field(
+        0.15, gt=0, description="share by which either has grown before a pair is compared again"
+    )
+    reach: float = Field(3.0, gt=0, description="[m] that a robot came while it was lost, at most")
+    step: float = Field(0.3, gt=0, description="[m] between the places tried there")
+    turn_step: float = Field(0.06, gt=0, description="[rad] between the headings tried there")
+    place: float = Field(2.0, gt=0, description="[m] within which the middles of submaps are alike")
+    visits: int = Field(
+        3, ge=1, description="submaps of a place that are compared, the last; more tell little more"
+    )
 
 
 class Reunion:
     """Remembers what it compared: a pair that was refused is asked again when it has grown."""
 
-    def __init__(self, parameters: FusionParameters) -> None:
-        self._parameters = parameters
+    def __init__(self, parameters: ReunionParameters | None = None) -> None:
+        self._p = parameters or ReunionParameters()
         self._compared: dict[tuple[int, int], tuple[float, float]] = {}
+        self._shapes: dict[int, tuple[object, Shape | None]] = {}
 
-    def reunite(self, submaps: Sequence[Submap]) -> tuple[list[Submap], list[tuple[int, int]]]:
+    def reunite(
+        self, submaps: Sequence[Submap], breaks: Sequence[int] = ()
+    ) -> tuple[list[Submap], list[tuple[int, int]]]:
         """Join every component to an older one where the shapes prove it.
+
+        Parameters
+        ----------
+        breaks
+            Ids of the submaps that were not tracked from the one before: there track was lost.
 
         Returns
         -------
@@ -40,7 +69,7 @@ class Reunion:
         joints: list[tuple[int, int]] = []
         for younger in sorted({s.component for s in submaps})[1:]:
             for older in sorted({s.component for s in joined if s.component < younger}):
-                after = self._joined(joined, older, younger)
+                after = self._joined(joined, older, younger, breaks)
                 if after is not None:
                     of_younger = {s.id for s in joined if s.component == younger}
                     joints.append(_nearest(after, older, of_younger))
@@ -48,17 +77,15 @@ class Reunion:
                     break
         return joined, joints
 
-    def _joined(self, submaps: Sequence[Submap], older: int, younger: int) -> list[Submap] | None:
+    def _joined(
+        self, submaps: Sequence[Submap], older: int, younger: int, breaks: Sequence[int]
+    ) -> list[Submap] | None:
         """Return `submaps` with two components as one, where their shapes prove it."""
         walls = _wall(submaps, older), _wall(submaps, younger)
         if not self._is_due((older, younger), walls):
             return None
         self._compared[older, younger] = walls
-        alignment = align_maps(
-            ("older", _lines(submaps, older)),
-            ("younger", _lines(submaps, younger)),
-            self._parameters,
-        )
+        alignment = self._compare(submaps, older, younger, breaks)
         if alignment.decision != "accepted":
             return None
         return [
@@ -68,12 +95,88 @@ class Reunion:
             for s in submaps
         ]
 
+    def _compare(
+        self, submaps: Sequence[Submap], older: int, younger: int, breaks: Sequence[int]
+    ) -> Alignment:
+        """Compare two components: by shape, and where that leaves it open, about the break."""
+        first, second = self._shape(submaps, older), self._shape(submaps, younger)
+        names, p = ("older", "younger"), self._p
+        anywhere = compare(names[0], first, names[1], second, p.fusion)
+        possible = _about_breaks(submaps, older, younger, breaks, p)
+        if anywhere.decision == "accepted" or len(possible) == 0:
+            return anywhere
+        here = compare(names[0], first, names[1], second, p.fusion, possible)
+        # A better place elsewhere says that it was carried away.
+        best = max(anywhere.evidence.get("score", 0.0), 0.0)
+        return here if here.evidence.get("score", 0.0) >= 0.95 * best else anywhere
+
+    def _shape(self, submaps: Sequence[Submap], component: int) -> Shape | None:
+        """Prepare a component, unless it is as it was the last time."""
+        inside = _covering([s for s in submaps if s.component == component], self._p)
+        now = tuple((s.map, s.pose.tobytes()) for s in inside)
+        known, shape = self._shapes.get(component, (None, None))
+        if known != now:
+            lines = unite_lines([place(s.map, s.pose) for s in inside])
+            shape = prepare(lines, self._p.fusion)
+            self._shapes[component] = now, shape
+        return shape
+
     def _is_due(self, pair: tuple[int, int], walls: tuple[float, float]) -> bool:
         """Whether either of a pair has notably more wall [m] than when it was compared."""
         before = self._compared.get(pair)
         if before is None:
             return True
-        return any(w > (1 + GROWTH) * b for w, b in zip(walls, before, strict=True))
+        return any(w > (1 + self._p.growth) * b for w, b in zip(walls, before, strict=True))
+
+
+def _covering(inside: Sequence[Submap], p: ReunionParameters) -> list[Submap]:
+    """Return the last submaps of each place: however often it was seen, a building stays as large.
+
+    In the order of `inside`.
+    """
+    kept: list[tuple[Submap, tuple[float, float]]] = []
+    for submap in reversed(inside):
+        middle = _middle(submap)
+        if sum(math.dist(middle, other) < p.place for _, other in kept) < p.visits:
+            kept.append((submap, middle))
+    return [submap for submap, _ in reversed(kept)]
+
+
+def _about_breaks(
+    submaps: Sequence[Submap],
+    older: int,
+    younger: int,
+    breaks: Sequence[int],
+    p: ReunionParameters,
+) -> FloatArray:
+    """(n, 3) transforms from `younger` to `older` by which the robot did not leap at a break."""
+    moves = _moves(p)
+    found = [np.empty((0, 3))]
+    for number in breaks:
+        if number == 0:
+            continue
+        before, after = submaps[number - 1], submaps[number]
+        last, first = _pose(before, -1), _pose(after, 0)
+        if (before.component, after.component) == (older, younger):
+            found.append(se2.compose(se2.compose(last, moves), se2.inverse(first)))
+        elif (before.component, after.component) == (younger, older):
+            found.append(se2.compose(first, se2.compose(se2.inverse(moves), se2.inverse(last))))
+    return np.concatenate(found)
+
+
+def _moves(p: ReunionParameters) -> FloatArray:
+    """(n, 3) all that a robot may have moved while it was lost [m, m, rad]."""
+    shifts = np.linspace(-p.reach, p.reach, 2 * int(np.ceil(p.reach / p.step)) + 1)
+    turns = np.arange(-np.pi, np.pi, p.turn_step)
+    x, y, turn = (a.ravel() for a in np.meshgrid(shifts, shifts, turns, indexing="ij"))
+    within = np.hypot(x, y) <= p.reach
+    moves: FloatArray = np.column_stack([x, y, turn])[within]
+    return moves
+
+
+def _pose(submap: Submap, scan: int) -> FloatArray:
+    """(3,) of one of the scans of a submap, component frame [m, m, rad]."""
+    return se2.compose(submap.pose, submap.trajectory.pose[scan])
 
 
 def _nearest(submaps: Sequence[Submap], component: int, younger: set[int]) -> tuple[int, int]:
@@ -104,7 +207,3 @@ def _wall(submaps: Sequence[Submap], component: int) -> float:
         for s in submaps
         if s.component == component
     )
-
-
-def _lines(submaps: Sequence[Submap], component: int) -> LineMap:
-    return unite_lines([place(s.map, s.pose) for s in submaps if s.component == component])

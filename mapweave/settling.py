@@ -15,12 +15,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import FloatArray, IntArray
-from mapweave.fusion import FusionParameters
 from mapweave.loop_closing import LoopCloser, LoopParameters
 from mapweave.maps import LineMap, Submap
 from mapweave.observation import Observation
 from mapweave.refinement import RefinementParameters, refine
-from mapweave.reunion import Reunion
+from mapweave.reunion import Reunion, ReunionParameters
 from mapweave.submap import GrowingSubmap, SubmapParameters
 from mapweave.surface import Surface, join_surfaces, line_surface
 from mapweave.uncertainty import EXACT
@@ -32,7 +31,7 @@ class SettlingParameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     submap: SubmapParameters = SubmapParameters()
-    fusion: FusionParameters = FusionParameters()
+    reunion: ReunionParameters = ReunionParameters()
     loops: LoopParameters = LoopParameters()
     refinement: RefinementParameters = RefinementParameters()
     spacing: float = Field(0.1, gt=0, description="[m] between points on older walls")
@@ -103,7 +102,8 @@ class Settler:
     def __init__(self, parameters: SettlingParameters) -> None:
         self._parameters = parameters
         self._submaps: list[Submap] = []
-        self._reunion = Reunion(parameters.fusion)
+        self._reunion = Reunion(parameters.reunion)
+        self._breaks: list[int] = []  # ids of submaps that were not tracked from the one before
         self._loops = LoopCloser(parameters.loops)
         self._settled: Settled | None = None
 
@@ -120,7 +120,9 @@ class Settler:
         submaps = [*self._submaps, finished.submap]
         if finished.follows and len(submaps) > 1:
             self._loops.graph.track(submaps[-2], submaps[-1])
-        submaps, joints = self._reunion.reunite(submaps)
+        elif not finished.follows:
+            self._breaks.append(finished.submap.id)
+        submaps, joints = self._reunion.reunite(submaps, self._breaks)
         for older, younger in joints:
             self._loops.graph.join(submaps[older], submaps[younger])
         submaps = self._loops.close(submaps)

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
-from mapweave.acceptance import AcceptanceParameters, Tracked, is_acceptable, is_credible
+from mapweave.acceptance import AcceptanceParameters, Tracked, is_acceptable, is_credible, is_held
 from mapweave.arrays import FloatArray
 from mapweave.correspondence import CorrespondenceParameters, correspond
 from mapweave.icp import Target, align, align_all
@@ -200,10 +200,18 @@ class Tracker:
         return se2.between(self._odometry, scan.odometry)
 
     def _reached(self, seen: Observation, starts: FloatArray) -> list[Tracked]:
-        """Align from each of `starts` (k, 3); leave out where a robot cannot have got to."""
-        found = self._aligned(seen, starts)
-        reach = self.parameters.max_step * (1 + len(self.missed) / 2)  # missed scans took time
-        return [t for t in found if np.hypot(*(t.pose - self.pose)[:2]) <= reach]
+        """Align from each of `starts` (k, 3); leave out where a robot cannot have got to.
+
+        After a miss, it may be anywhere: only a place that is held counts.
+        """
+        p, missed = self.parameters, len(self.missed)
+        reach = p.max_step * (1 + missed / 2)  # missed scans took time
+        return [
+            t
+            for t in self._aligned(seen, starts)
+            if np.hypot(*(t.pose - self.pose)[:2]) <= reach
+            and (not missed or is_held(t, p.acceptance))
+        ]
 
     def _slid(self, seen: Observation, tracked: Tracked) -> Tracked:
         """Look along the direction that the walls leave open, if they leave one: a corridor.

@@ -7,12 +7,9 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place
-from mapweave.fusion import FusionParameters
 from mapweave.maps import LineMap, Submap, Trajectory
-from mapweave.reunion import Reunion
-from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, part, random_pose, shaken
-
-P = FusionParameters()
+from mapweave.reunion import Reunion, ReunionParameters, _covering
+from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, corridor, part, random_pose, shaken
 
 
 def submap(number: int, component: int, pose: FloatArray, lines: LineMap) -> Submap:
@@ -36,7 +33,7 @@ def test_a_component_that_shares_a_shape_with_an_older_one_joins_it(
         pose = random_pose(rng)
         inside = submap(k, 1, pose, parts[k])
         submaps.append(Submap(k, 1, se2.compose(lost, pose), inside.map, inside.trajectory))
-    joined, joints = Reunion(P).reunite(submaps)
+    joined, joints = Reunion().reunite(submaps)
     assert [s.component for s in joined] == [0, 0, 0, 0]
     assert [s.id for s in joined] == [0, 1, 2, 3]
     assert joints == [(1, 2)]  # of those nearest to each other: 10-20 m and 9-19 m
@@ -55,23 +52,23 @@ def test_a_component_of_another_place_stays_apart(parts: list[LineMap], rng: Gen
         submap(0, 0, random_pose(rng), parts[0]),
         submap(1, 1, random_pose(rng), part(OTHER_BUILDING, 0, 26)),
     ]
-    assert Reunion(P).reunite(submaps) == (submaps, [])
+    assert Reunion().reunite(submaps) == (submaps, [])
 
 
 def test_one_component_is_left_as_it_is(parts: list[LineMap]) -> None:
     submaps = [submap(0, 3, np.zeros(3), parts[0]), submap(1, 3, np.zeros(3), parts[1])]
-    assert Reunion(P).reunite(submaps) == (submaps, [])
+    assert Reunion().reunite(submaps) == (submaps, [])
 
 
 def test_no_submaps_are_no_components() -> None:
-    assert Reunion(P).reunite([]) == ([], [])
+    assert Reunion().reunite([]) == ([], [])
 
 
 def test_a_pair_that_was_refused_is_compared_again_when_it_has_grown(
     parts: list[LineMap], rng: Generator
 ) -> None:
     small = shaken(part(BUILDING, 10, 11), rng)
-    reunion = Reunion(P)
+    reunion = Reunion()
     first, little = submap(0, 0, np.zeros(3), parts[0]), submap(1, 1, random_pose(rng), small)
     assert reunion.reunite([first, little]) == ([first, little], [])
     grown = submap(1, 1, little.pose, part(BUILDING, 4, 12))
@@ -89,8 +86,65 @@ def test_a_pair_that_was_refused_is_not_compared_again_before_it_has_grown(
         submap(0, 0, np.zeros(3), parts[0]),
         submap(1, 1, random_pose(rng), elsewhere),
     )
-    reunion = Reunion(P)
+    reunion = Reunion()
     assert reunion.reunite([first, other])[1] == []
     alike = submap(1, 1, other.pose, part(BUILDING, 4, 12))
-    assert Reunion(P).reunite([first, alike])[1] == [(0, 1)]
+    assert Reunion().reunite([first, alike])[1] == [(0, 1)]
     assert reunion.reunite([first, alike])[1] == []
+
+
+def broken(parts: list[LineMap], gap: FloatArray) -> list[Submap]:
+    """Return two submaps of one corridor; at the end of the first, track was lost.
+
+    The robot then moved by `gap` (3,), and the second component begins there.
+    """
+    last = np.array([19.0, 1.0, 0.0])
+    first = se2.compose(last, gap)
+    path = np.array([[11.0, 1.0, 0.0], last])
+    before = submap(0, 0, np.zeros(3), parts[0])
+    after = submap(1, 1, first, parts[1])
+    return [
+        Submap(0, 0, before.pose, before.map, trajectory(path)),
+        Submap(1, 1, np.zeros(3), after.map, trajectory(np.zeros((1, 3)))),
+    ]
+
+
+def trajectory(pose: FloatArray) -> Trajectory:
+    return Trajectory(np.arange(len(pose)), np.zeros(len(pose)), pose, None)
+
+
+# A corridor with the same two alcoves again 14 m farther on.
+TWINS = corridor(
+    60.0,
+    [(x, x + w, d) for s in (0, 14) for x, w, d in ((s + 15.0, 1.5, 2.0), (s + 18.0, 3.0, 1.2))],
+    [],
+)
+
+
+def test_a_robot_that_lost_track_is_looked_for_where_it_lost_it(rng: Generator) -> None:
+    """Shapes alone leave two places open; the robot did not leap 14 m."""
+    parts = [shaken(part(TWINS, 8, 40), rng), shaken(part(TWINS, 12, 22), rng)]
+    submaps = broken(parts, np.array([0.8, 0.2, 0.3]))
+    assert Reunion().reunite(submaps)[1] == []
+    joined, joints = Reunion().reunite(submaps, breaks=[1])
+    assert joints == [(0, 1)]
+    np.testing.assert_allclose(joined[1].pose, [19.86, 1.2, 0.3], atol=0.15)
+
+
+def test_a_robot_that_was_carried_away_is_not_believed_to_be_where_it_was(rng: Generator) -> None:
+    """What it saw fits better elsewhere."""
+    parts = [shaken(part(BUILDING, 0, 30), rng), shaken(part(BUILDING, 0, 10), rng)]
+    submaps = broken(parts, np.zeros(3))
+    away = submap(1, 1, np.array([3.0, 1.0, 0.5]), parts[1])
+    submaps[1] = Submap(1, 1, np.zeros(3), away.map, trajectory(np.zeros((1, 3))))
+    joined, _ = Reunion().reunite(submaps, breaks=[1])
+    np.testing.assert_allclose(joined[1].pose, [3.0, 1.0, 0.5], atol=0.15)
+
+
+def test_however_often_a_place_was_seen_comparing_it_costs_no_more(parts: list[LineMap]) -> None:
+    p = ReunionParameters()
+    laps = [submap(k, 0, np.zeros(3), parts[k % 4]) for k in range(40)]
+    covering = _covering(laps, p)
+    assert len(covering) <= 4 * p.visits
+    assert covering[-1] is laps[-1]
+    assert {id(s.map.segments) for s in covering} >= {id(s.map.segments) for s in laps[-4:]}
