@@ -79,9 +79,13 @@ def is_credible(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
     return tracked.evidence.score >= p.convincing or doubt <= p.max_doubt
 
 
-def is_held(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
-    """Whether a pose is held in every direction: along bare walls, look-alikes fit as well."""
-    return bool(np.linalg.eigvalsh(tracked.information[:2, :2])[0] >= parameters.held)
+def is_found_again(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
+    """Whether a pose counts after a miss: it explains half, and is held in every direction.
+
+    The robot may be anywhere, and along bare walls look-alikes fit as well.
+    """
+    p, held = parameters, np.linalg.eigvalsh(tracked.information[:2, :2])[0]
+    return bool(held >= p.held and tracked.evidence.score >= p.acceptable)
 
 
 def is_acceptable(

@@ -15,7 +15,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
-from mapweave.acceptance import AcceptanceParameters, Tracked, is_acceptable, is_credible, is_held
+from mapweave.acceptance import (
+    AcceptanceParameters,
+    Tracked,
+    is_acceptable,
+    is_credible,
+    is_found_again,
+)
 from mapweave.arrays import FloatArray
 from mapweave.correspondence import CorrespondenceParameters, correspond
 from mapweave.icp import Target, align, align_all
@@ -202,7 +208,7 @@ class Tracker:
     def _reached(self, seen: Observation, starts: FloatArray) -> list[Tracked]:
         """Align from each of `starts` (k, 3); leave out where a robot cannot have got to.
 
-        After a miss, it may be anywhere: only a place that is held counts.
+        After a miss, only where it can be told from look-alikes.
         """
         p, missed = self.parameters, len(self.missed)
         reach = p.max_step * (1 + missed / 2)  # missed scans took time
@@ -210,7 +216,7 @@ class Tracker:
             t
             for t in self._aligned(seen, starts)
             if np.hypot(*(t.pose - self.pose)[:2]) <= reach
-            and (not missed or is_held(t, p.acceptance))
+            and (not missed or is_found_again(t, p.acceptance))
         ]
 
     def _slid(self, seen: Observation, tracked: Tracked) -> Tracked:
