@@ -7,6 +7,7 @@ hypothesis; what both submaps saw decides.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -60,6 +61,28 @@ class LoopParameters(BaseModel):
     min_turn_sigma: float = Field(0.003, gt=0, description="[rad] no closure is better")
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """An older submap and the newest one.
+
+    Attributes
+    ----------
+    older
+        The older one.
+    raster
+        Of its lines, in its frame.
+    verdict
+        What both saw, at the best pose within the drift.
+    link
+        Of the two, where that proves one.
+    """
+
+    older: Submap
+    raster: MapRaster
+    verdict: Verdict
+    link: Link | None
+
+
 class LoopCloser:
     """Finds the newest submap in the older ones, and keeps all of them where they fit."""
 
@@ -69,12 +92,21 @@ class LoopCloser:
         # By the lines, which are the same object as long as they are the same lines.
         self._seen = lru_cache(parameters.remembered)(self._prepare)
 
-    def close(self, submaps: Sequence[Submap]) -> list[Submap]:
-        """Look for the last of `submaps` among the others; return all at their best poses."""
-        return self.graph.close(submaps, self._closures_of(submaps))
+    def close(
+        self, submaps: Sequence[Submap], compared: Sequence[Comparison] | None = None
+    ) -> list[Submap]:
+        """Return `submaps` at the poses that fit all links, and those of the last one to others.
 
-    def _closures_of(self, submaps: Sequence[Submap]) -> list[Link]:
-        """Return the links from older submaps to the last one that what they saw proves."""
+        Parameters
+        ----------
+        compared
+            What comparing the last one came to, if that is known.
+        """
+        found = self.compare(submaps) if compared is None else compared
+        return self.graph.close(submaps, [c.link for c in found if c.link is not None])
+
+    def compare(self, submaps: Sequence[Submap]) -> list[Comparison]:
+        """Look for the last of `submaps` in the older ones about where it is believed to be."""
         p = self._parameters
         *older, newest = submaps
         if len(newest.map.segments) == 0:
@@ -89,11 +121,10 @@ class LoopCloser:
             and (distance := math.dist(_middle(s), here)) < p.reach + _drift(path, p)
         ]
         nearest = sorted(near, key=lambda item: item[0])[: p.candidates]
-        links = [self._compare(s, newest, path) for _, path, s in nearest]
-        return [link for link in links if link is not None]
+        return [self._compare(s, newest, path) for _, path, s in nearest]
 
-    def _compare(self, older: Submap, newest: Submap, path: float) -> Link | None:
-        """Return the link from `older` to `newest`, where what both saw proves one."""
+    def _compare(self, older: Submap, newest: Submap, path: float) -> Comparison:
+        """Compare two submaps, `path` [m] of tracked path apart; what both saw may prove a link."""
         p = self._parameters
         (reference, target), (other, _) = self._seen(older.map), self._seen(newest.map)
         believed = se2.between(older.pose, newest.pose)
@@ -105,10 +136,11 @@ class LoopCloser:
         verdicts = [verify(reference, other, fit.pose, p.verification) for fit in fits]
         poses = np.array([fit.pose for fit in fits])
         ranked = different(poses, np.array([v.score for v in verdicts]), middle, p.hypotheses)
+        fit, best = fits[ranked[0]], verdicts[ranked[0]]
         if not _proves([verdicts[k] for k in ranked], p):
-            return None
-        fit = fits[ranked[0]]
-        return Link(older.id, newest.id, fit.pose, _covariance(fit, p), False)
+            return Comparison(older, reference, best, None)
+        link = Link(older.id, newest.id, fit.pose, _covariance(fit, p), False)
+        return Comparison(older, reference, best, link)
 
     def _prepare(self, lines: LineMap) -> tuple[MapRaster, Target]:
         raster = MapRaster.of(lines, self._parameters.raster)

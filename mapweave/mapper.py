@@ -146,11 +146,9 @@ class Mapper:
         if not self._growing.is_empty:
             self._finish_submap()
         if any(s.component == self._component for s in self._finished):
-            # A number is used once: one that joined another component is not given again.
-            self._newest_component += 1
-            self._component = self._newest_component
+            self._component = self._newest_component = self._spare() + self._unsettled
         self._follows = False
-        self._tracker = Tracker(self.parameters.tracker)
+        self._tracker = self._tracker.afresh()
         self._origin = self._frame = se2.IDENTITY
         for seen in waiting:
             self._place(seen)
@@ -173,7 +171,7 @@ class Mapper:
         self._adopt_settled()
         submap = self._submap()
         scans = tuple(self._merged[k] for k in submap.trajectory.scan_index.tolist())
-        self._settling.begin(Finished(submap, scans, self._follows))
+        self._settling.begin(Finished(submap, scans, self._follows, self._spare()))
         self._finished.append(submap)
         self._unsettled = self._follows = True
         self._growing = GrowingSubmap(self.parameters.settling.submap)
@@ -189,11 +187,19 @@ class Mapper:
         before = _end(self._finished[-1])
         self._finished = settled.applied(self._finished)
         self._version += 1
+        self._newest_component = max(self._newest_component, *(s.component for s in self._finished))
         if self._follows:
             after = _end(self._finished[-1])
             self._component = self._finished[-1].component
             moved = se2.compose(after, se2.inverse(before))
             self._origin = se2.compose(moved, self._origin)
+
+    def _spare(self) -> int:
+        """Return the next component's number. One that joined another is not given again.
+
+        While a submap is being settled, this number is lent: it may be found to need one.
+        """
+        return self._newest_component + 1
 
     def _submap(self) -> Submap:
         return Submap(

@@ -15,8 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import FloatArray, IntArray
-from mapweave.loop_closing import LoopCloser, LoopParameters
-from mapweave.maps import LineMap, Submap
+from mapweave.departure import DepartureParameters, departs, departure
+from mapweave.loop_closing import Comparison, LoopCloser, LoopParameters
+from mapweave.maps import LineMap, Submap, Trajectory
 from mapweave.observation import Observation
 from mapweave.refinement import RefinementParameters, refine
 from mapweave.reunion import Reunion, ReunionParameters
@@ -33,6 +34,7 @@ class SettlingParameters(BaseModel):
     submap: SubmapParameters = SubmapParameters()
     reunion: ReunionParameters = ReunionParameters()
     loops: LoopParameters = LoopParameters()
+    departure: DepartureParameters = DepartureParameters()
     refinement: RefinementParameters = RefinementParameters()
     spacing: float = Field(0.1, gt=0, description="[m] between points on older walls")
 
@@ -49,11 +51,14 @@ class Finished:
         The scans of its trajectory, in that order.
     follows
         Whether it was tracked from the submap before it.
+    spare
+        The number of a component, if another one is needed.
     """
 
     submap: Submap
     scans: tuple[Observation, ...]
     follows: bool
+    spare: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,24 +71,26 @@ class Settled:
         (n,) of each submap.
     pose
         (n, 3) of each submap in its component's frame [m, m, rad].
-    newest
-        The last submap, its scans refined and merged again.
+    renewed
+        The last submap, its scans refined and merged again; in two where it was found that the
+        robot jumped meanwhile.
     """
 
     component: IntArray
     pose: FloatArray
-    newest: Submap
+    renewed: tuple[Submap, ...]
 
     def applied(self, submaps: Sequence[Submap]) -> list[Submap]:
         """Return `submaps`, those settled so far, at their new poses."""
         *older, _ = submaps
+        count = len(older)
         placed = [
             replace(s, component=component, pose=pose)
             for s, component, pose in zip(
-                older, self.component[:-1].tolist(), self.pose[:-1], strict=True
+                older, self.component[:count].tolist(), self.pose[:count], strict=True
             )
         ]
-        return [*placed, self.newest]
+        return [*placed, *self.renewed]
 
 
 class Settling(Protocol):
@@ -117,37 +124,95 @@ class Settler:
 
     def settle(self, finished: Finished) -> Settled:
         """Join, close, refine and merge again."""
+        count = len(self._submaps)
         submaps = [*self._submaps, finished.submap]
-        if finished.follows and len(submaps) > 1:
+        if finished.follows and count:
             self._loops.graph.track(submaps[-2], submaps[-1])
-        elif not finished.follows:
+        elif count:
             self._breaks.append(finished.submap.id)
+        compared = self._loops.compare(submaps)
+        at = self._departure(finished, compared)
+        parts = [finished] if at is None else _cut(finished, at, self._parameters.submap)
+        if at is not None:
+            self._breaks += [part.submap.id for part in parts if not part.follows]
+            compared = []
+        submaps = [*self._submaps, *(part.submap for part in parts)]
         submaps, joints = self._reunion.reunite(submaps, self._breaks)
         for older, younger in joints:
             self._loops.graph.join(submaps[older], submaps[younger])
-        submaps = self._loops.close(submaps)
-        newest = self._refined(submaps, finished.scans)
-        self._submaps = [*submaps[:-1], newest]
+        submaps = self._loops.close(submaps, None if joints else compared)
+        renewed = [self._refined(submaps, submaps[count + k], p) for k, p in enumerate(parts)]
+        self._submaps = [*submaps[:count], *renewed]
         component = np.array([s.component for s in self._submaps])
-        return Settled(component, np.array([s.pose for s in self._submaps]), newest)
+        poses = np.array([s.pose for s in self._submaps])
+        return Settled(component, poses, tuple(renewed))
 
-    def _refined(self, submaps: Sequence[Submap], scans: Sequence[Observation]) -> Submap:
-        """Refine the newest of `submaps` against those it is linked with, and merge it again."""
+    def _departure(self, finished: Finished, compared: Sequence[Comparison]) -> int | None:
+        """Return from which of its scans on a submap is not where tracking has it, if any."""
+        p = self._parameters.departure
+        if not finished.follows or not departs([c.verdict for c in compared], p):
+            return None
+        frame = finished.submap.pose
+        older = [(c.raster, se2.between(c.older.pose, frame)) for c in compared]
+        surfaces = [seen.surface for seen in finished.scans]
+        at = departure(surfaces, finished.submap.trajectory.pose, older, p)
+        return at if at < len(finished.scans) else None
+
+    def _refined(self, submaps: Sequence[Submap], newest: Submap, finished: Finished) -> Submap:
+        """Refine `newest` against those of `submaps` it is linked with, and merge it again."""
         p = self._parameters
-        newest = submaps[-1]
         linked = [submaps[k] for k in self._loops.graph.neighbours(newest.id)]
         poses = refine(
-            [seen.surface for seen in scans],
+            [seen.surface for seen in finished.scans],
             newest.trajectory.pose,
             _walls(linked, newest.pose, p.spacing),
             p.refinement,
         )
-        growing = GrowingSubmap(p.submap)
-        held = newest.trajectory.uncertainty
-        uncertainties = np.tile(EXACT, (len(poses), 1)) if held is None else held
-        for seen, pose, uncertainty in zip(scans, poses, uncertainties, strict=True):
-            growing.add(seen.scan, seen.lines.segments, pose, uncertainty)
+        growing = _merged(finished.scans, poses, newest.trajectory.uncertainty, p.submap)
         return replace(newest, map=growing.line_map(), trajectory=growing.trajectory())
+
+
+def _cut(finished: Finished, at: int, parameters: SubmapParameters) -> list[Finished]:
+    """Return the parts of a submap before and from scan `at` on, the latter in a component anew.
+
+    Nothing tracks the latter from the former, which is left out where it is empty.
+    """
+    submap, scans = finished.submap, finished.scans
+    spans = [slice(at), slice(at, None)] if at else [slice(None)]
+    parts = []
+    for number, span in enumerate(spans, start=submap.id):
+        path = _part(submap.trajectory, span)
+        lines = _merged(scans[span], path.pose, path.uncertainty, parameters).line_map()
+        is_tail = span is spans[-1]
+        component = finished.spare if is_tail else submap.component
+        part = replace(submap, id=number, component=component, map=lines, trajectory=path)
+        follows = finished.follows and not is_tail
+        parts.append(Finished(part, scans[span], follows, finished.spare))
+    return parts
+
+
+def _part(trajectory: Trajectory, chosen: slice) -> Trajectory:
+    held = trajectory.uncertainty
+    return Trajectory(
+        trajectory.scan_index[chosen],
+        trajectory.stamp[chosen],
+        trajectory.pose[chosen],
+        None if held is None else held[chosen],
+    )
+
+
+def _merged(
+    scans: Sequence[Observation],
+    poses: FloatArray,
+    uncertainty: FloatArray | None,
+    parameters: SubmapParameters,
+) -> GrowingSubmap:
+    """Merge `scans` at (n, 3) `poses`, of which (n, 4) `uncertainty` is known, or none."""
+    growing = GrowingSubmap(parameters)
+    known = np.tile(EXACT, (len(poses), 1)) if uncertainty is None else uncertainty
+    for seen, pose, each in zip(scans, poses, known, strict=True):
+        growing.add(seen.scan, seen.lines.segments, pose, each)
+    return growing
 
 
 def _walls(submaps: Sequence[Submap], frame: FloatArray, spacing: float) -> Surface:

@@ -92,6 +92,12 @@ class Tracker:
         self._before: _State | None = None  # of the scan on probation
         self._probation: Found = []
 
+    def afresh(self) -> "Tracker":
+        """Return a tracker of the same robot that knows no place: it moves as it did."""
+        other = Tracker(self.parameters)
+        other._pace = self._pace.copy()
+        return other
+
     def place(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
         """Find the pose of a scan; of those that were missed as well, once it is found again.
 

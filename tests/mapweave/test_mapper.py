@@ -236,7 +236,7 @@ class JoinsAll:
     def take(self) -> Settled:
         """Return where all are."""
         poses = np.array([s.pose for s in self._submaps])
-        return Settled(np.zeros(len(poses), dtype=np.int64), poses, self._submaps[-1])
+        return Settled(np.zeros(len(poses), dtype=np.int64), poses, (self._submaps[-1],))
 
 
 def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> None:

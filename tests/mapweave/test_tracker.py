@@ -179,3 +179,16 @@ def test_at_the_end_the_scan_on_probation_is_believed(rng: Generator) -> None:
     assert tracker.place(last, LineMap.empty) == []
     assert any(seen is last for seen, _ in tracker.settle())
     assert tracker.settle() == []
+
+
+def test_a_robot_that_lost_track_moves_as_it_did(rng: Generator) -> None:
+    """Where the walls are bare, what it is expected to do decides; it need not learn that again."""
+    bare = walls_of(corridor(80, [], []))
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, [x, 1.0, 0.0], noise=rng) for x in np.arange(4, 11, 0.5)])
+    anew = tracker.afresh()
+    scans = [cast(bare, [x, 1.1, 0.0], noise=rng) for x in np.arange(30, 33, 0.5)]
+    found = tracked_along(anew, scans)
+    assert found[0] is not None and (found[0].pose == 0).all()
+    assert found[-1] is not None
+    assert abs(found[-1].pose[0] - 2.5) < 0.3
