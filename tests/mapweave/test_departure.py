@@ -1,0 +1,105 @@
+"""What a robot maps after a jump that it did not notice contradicts what it mapped before."""
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.departure import DepartureParameters, departs, departure
+from mapweave.map_raster import MapRaster, RasterParameters
+from mapweave.mapper import Mapper
+from mapweave.observation import ObservationParameters, observe
+from mapweave.scan import Scan
+from mapweave.verification import Verdict
+from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, cast, corridor, part, walls_of
+
+P = DepartureParameters()
+
+
+def verdict(common: float, contradicted: float) -> Verdict:
+    return Verdict(common, contradicted, 0.5, 0.05, 3.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("common", "contradicted", "expected"),
+    [(100, 2, False), (100, 20, False), (20, 20, True), (0, 11, False), (-1, 13, True)],
+)
+def test_much_contradiction_and_a_large_share_of_it_is_a_departure(
+    common: float, contradicted: float, expected: bool
+) -> None:
+    verdicts = [verdict(common / 2, contradicted / 2)] * 2
+    assert departs(verdicts, P) == expected
+
+
+def test_a_submap_that_nothing_was_compared_with_does_not_depart() -> None:
+    assert not departs([], P)
+
+
+def seen_at(outline: FloatArray, poses: FloatArray, rng: Generator) -> list[Scan]:
+    return [cast(walls_of(outline), pose, noise=rng) for pose in poses]
+
+
+def first_departed(scans: list[Scan], poses: FloatArray, frame: FloatArray) -> int:
+    """Ask a map of the building of scans believed to be at `poses` (n, 3) of it."""
+    raster = MapRaster.of(part(BUILDING, 0, 30), RasterParameters())
+    surfaces = [observe(scan, ObservationParameters()).surface for scan in scans]
+    local = se2.compose(se2.inverse(frame), poses)
+    return departure(surfaces, local, [(raster, frame)], P)
+
+
+def test_scans_where_they_are_believed_to_be_do_not_depart(rng: Generator) -> None:
+    poses = np.array([[x, 1.0, 0.1] for x in np.arange(3, 9, 0.5)])
+    assert first_departed(seen_at(BUILDING, poses, rng), poses, se2.IDENTITY) == len(poses)
+
+
+@pytest.mark.parametrize("at", [0, 5, 9])
+def test_the_first_scan_that_was_taken_elsewhere_departs(at: int, rng: Generator) -> None:
+    """Whatever frame the poses are given in."""
+    poses = np.array([[x, 1.0, 0.1] for x in np.arange(3, 9, 0.5)])
+    here = seen_at(BUILDING, poses[:at], rng)
+    there = seen_at(OTHER_BUILDING, poses[at:] + np.array([5.0, -3.0, 0.9]), rng)
+    frame = np.array([4.0, -2.0, 1.0])
+    assert abs(first_departed([*here, *there], poses, frame) - at) <= 1
+
+
+NICHES = ((4.0, 1.5, 0.8), (7.0, 2.5, 2.5), (11.5, 1.0, 1.6))
+# The same niches twice, 30 m apart; those in between and beyond are of other kinds.
+TWINS = corridor(
+    64.0,
+    [(s + x, s + x + w, d) for s in (2.0, 32.0) for x, w, d in NICHES]
+    + [(17.0, 21.0, 2.5), (24.0, 25.0, 0.7), (48.0, 49.5, 1.1), (53.0, 58.0, 2.0)],
+    [(18.5, 20.0, 1.0), (26.0, 29.5, 1.8), (50.0, 51.0, 1.5), (55.0, 56.5, 0.6)],
+)
+
+
+def test_a_jump_into_a_look_alike_is_found_out_and_undone(rng: Generator) -> None:
+    """Nothing at the jump tells of it: what the robot sees goes on as it did."""
+    walls = walls_of(TWINS)
+    out = [[x, 1.1, 0.0] for x in np.arange(1, 62, 0.5)]
+    back = [[x, 1.1, np.pi] for x in np.arange(62, 1, -0.5)]
+    turns = [
+        [[x, 1.1, start + a] for a in np.arange(0.3, 3, 0.3)]
+        for x, start in ((61.5, 0), (1.5, np.pi))
+    ]
+    before = [[x, 1.1, 0.0] for x in np.arange(1.5, 10, 0.5)]
+    after = [[x, 1.1, 0.0] for x in np.arange(40, 60, 0.5)]
+    poses = np.array([*out, *turns[0], *back, *turns[1], *before, *after])
+    mapper = Mapper("a")
+    said = [
+        mapper.add(cast(walls, pose, index=k, noise=rng, max_range=7.0))
+        for k, pose in enumerate(poses)
+    ]
+    robot_map = mapper.finish()
+    assert not any(p.lost for p in said)
+    where = {
+        int(k): (s.component, se2.compose(s.pose, pose))
+        for s in robot_map.submaps
+        for k, pose in zip(s.trajectory.scan_index, s.trajectory.pose, strict=True)
+    }
+    assert sorted(where) == list(range(len(poses)))
+    assert [s.id for s in robot_map.submaps] == list(range(len(robot_map.submaps)))
+    true = se2.between(poses[0], poses[-1])
+    component, last = where[len(poses) - 1]
+    assert component == 0
+    np.testing.assert_allclose(last[:2], true[:2], atol=0.5)
