@@ -17,10 +17,14 @@ from mapweave.maps import Alignment, RobotMap, Submap
 
 
 class SubmapPlace(NamedTuple):
-    """Where a submap was: (3,) `pose` [m, m, rad] in component number `component`."""
+    """Where a submap was: (3,) `pose` [m, m, rad] in component number `component`.
+
+    The index of its `first` scan tells whether it is the same: one that was cut shares its id.
+    """
 
     component: int
     pose: FloatArray
+    first: int | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +37,7 @@ class Change:
 
 def places_of(robot_map: RobotMap) -> dict[int, SubmapPlace]:
     """Return where each submap is, by its id."""
-    return {s.id: SubmapPlace(s.component, s.pose) for s in robot_map.submaps}
+    return {s.id: SubmapPlace(s.component, s.pose, _first(s)) for s in robot_map.submaps}
 
 
 def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
@@ -62,8 +66,17 @@ def _kept(change: Change, component: str) -> list[Submap]:
     return [
         s
         for s in change.now.submaps
-        if s.component == number and s.id in change.then and change.then[s.id].component == number
+        if s.component == number
+        and s.id in change.then
+        and change.then[s.id].component == number
+        and change.then[s.id].first == _first(s)
     ]
+
+
+def _first(submap: Submap) -> int | None:
+    """Return the index of a submap's first scan; None where it has none."""
+    indices = submap.trajectory.scan_index
+    return int(indices[0]) if len(indices) else None
 
 
 def _middle(submap: Submap, change: Change) -> FloatArray:

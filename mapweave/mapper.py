@@ -32,7 +32,10 @@ class MapperParameters(BaseModel):
     uncertainty: UncertaintyParameters = UncertaintyParameters()
     settling: SettlingParameters = SettlingParameters()
     patience: int = Field(
-        5, ge=1, description="scans in a row that fit nowhere before the robot counts as lost"
+        5,
+        ge=1,
+        description="scans in a row that fit nowhere, or were not confirmed by the next one, before"
+        " the robot counts as lost",
     )
 
 
@@ -187,7 +190,7 @@ class Mapper:
         before = _end(self._finished[-1])
         self._finished = settled.applied(self._finished)
         self._version += 1
-        self._newest_component = max(self._newest_component, *(s.component for s in self._finished))
+        self._newest_component = max(self._newest_component, settled.newest_component)
         if self._follows:
             after = _end(self._finished[-1])
             self._component = self._finished[-1].component

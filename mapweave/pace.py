@@ -29,7 +29,9 @@ class PaceParameters(BaseModel):
     held: float = Field(3.0, gt=0, description="points that hold a determined step")
     spread: float = Field(2.5, gt=0, description="sigma, in medians of what steps are off")
     min_sigma: float = Field(0.1, gt=0, description="[m] of a step against the expected one")
-    max_sigma: float = Field(0.5, gt=0, description="[m] as long as nothing is known")
+    max_sigma: float = Field(
+        0.5, gt=0, description="[m] as long as nothing is known, after a miss, and by odometry"
+    )
     turn_sigma: float = Field(0.35, gt=0, description="[rad] of a turn against the last one")
     surprise: float = Field(
         0.02, ge=0, description="share of returns that a step e sigma² off is worth less"

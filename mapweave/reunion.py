@@ -54,7 +54,7 @@ class Reunion:
         Parameters
         ----------
         breaks
-            Ids of the submaps that were not tracked from the one before: there track was lost.
+            Ids of submaps, from 1 on, not tracked from the one before: there track was lost.
 
         Returns
         -------
@@ -74,6 +74,7 @@ class Reunion:
                     of_younger = {s.id for s in joined if s.component == younger}
                     joints.append(_nearest(after, older, of_younger))
                     joined = after
+                    self._shapes.pop(younger, None)
                     break
         return joined, joints
 
@@ -153,8 +154,6 @@ def _about_breaks(
     moves = _moves(p)
     found = [np.empty((0, 3))]
     for number in breaks:
-        if number == 0:
-            continue
         before, after = submaps[number - 1], submaps[number]
         last, first = _pose(before, -1), _pose(after, 0)
         if (before.component, after.component) == (older, younger):

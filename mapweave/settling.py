@@ -74,11 +74,14 @@ class Settled:
     renewed
         The last submap, its scans refined and merged again; in two where it was found that the
         robot jumped meanwhile.
+    newest_component
+        The highest number of a component that was used, joined since or not.
     """
 
     component: IntArray
     pose: FloatArray
     renewed: tuple[Submap, ...]
+    newest_component: int
 
     def applied(self, submaps: Sequence[Submap]) -> list[Submap]:
         """Return `submaps`, those settled so far, at their new poses."""
@@ -131,21 +134,32 @@ class Settler:
         elif count:
             self._breaks.append(finished.submap.id)
         compared = self._loops.compare(submaps)
+        parts = [(finished.submap, finished.scans)]
         at = self._departure(finished, compared)
-        parts = [finished] if at is None else _cut(finished, at, self._parameters.submap)
         if at is not None:
-            self._breaks += [part.submap.id for part in parts if not part.follows]
-            compared = []
-        submaps = [*self._submaps, *(part.submap for part in parts)]
+            parts = _cut(finished, at, self._parameters.submap)
+            submaps = self._departed(submaps, [part for part, _ in parts])
         submaps, joints = self._reunion.reunite(submaps, self._breaks)
         for older, younger in joints:
             self._loops.graph.join(submaps[older], submaps[younger])
-        submaps = self._loops.close(submaps, None if joints else compared)
-        renewed = [self._refined(submaps, submaps[count + k], p) for k, p in enumerate(parts)]
+        submaps = self._loops.close(submaps, compared if at is None and not joints else None)
+        renewed = [
+            self._refined(submaps, submaps[count + k], scans) for k, (_, scans) in enumerate(parts)
+        ]
         self._submaps = [*submaps[:count], *renewed]
         component = np.array([s.component for s in self._submaps])
         poses = np.array([s.pose for s in self._submaps])
-        return Settled(component, poses, tuple(renewed))
+        newest = finished.submap.component if at is None else finished.spare
+        return Settled(component, poses, tuple(renewed), newest)
+
+    def _departed(self, submaps: Sequence[Submap], parts: Sequence[Submap]) -> list[Submap]:
+        """Return `submaps`, the last in `parts`: nothing tracks the last of these from before."""
+        *older, _ = submaps
+        self._breaks.append(parts[-1].id)
+        if len(parts) == 1:
+            self._loops.graph.untrack()
+            return [*older, *parts]
+        return [*self._loops.close([*older, parts[0]]), parts[1]]
 
     def _departure(self, finished: Finished, compared: Sequence[Comparison]) -> int | None:
         """Return from which of its scans on a submap is not where tracking has it, if any."""
@@ -158,36 +172,39 @@ class Settler:
         at = departure(surfaces, finished.submap.trajectory.pose, older, p)
         return at if at < len(finished.scans) else None
 
-    def _refined(self, submaps: Sequence[Submap], newest: Submap, finished: Finished) -> Submap:
+    def _refined(
+        self, submaps: Sequence[Submap], newest: Submap, scans: Sequence[Observation]
+    ) -> Submap:
         """Refine `newest` against those of `submaps` it is linked with, and merge it again."""
         p = self._parameters
         linked = [submaps[k] for k in self._loops.graph.neighbours(newest.id)]
         poses = refine(
-            [seen.surface for seen in finished.scans],
+            [seen.surface for seen in scans],
             newest.trajectory.pose,
             _walls(linked, newest.pose, p.spacing),
             p.refinement,
         )
-        growing = _merged(finished.scans, poses, newest.trajectory.uncertainty, p.submap)
+        growing = _merged(scans, poses, newest.trajectory.uncertainty, p.submap)
         return replace(newest, map=growing.line_map(), trajectory=growing.trajectory())
 
 
-def _cut(finished: Finished, at: int, parameters: SubmapParameters) -> list[Finished]:
-    """Return the parts of a submap before and from scan `at` on, the latter in a component anew.
+def _cut(
+    finished: Finished, at: int, parameters: SubmapParameters
+) -> list[tuple[Submap, tuple[Observation, ...]]]:
+    """Return the parts of a submap before and from scan `at` on, each with its scans.
 
-    Nothing tracks the latter from the former, which is left out where it is empty.
+    The latter is in a component anew; the former is left out where it is empty.
     """
     submap, scans = finished.submap, finished.scans
-    spans = [slice(at), slice(at, None)] if at else [slice(None)]
+    if at == 0:
+        return [(replace(submap, component=finished.spare), scans)]
+    numbers = (submap.id, submap.component), (submap.id + 1, finished.spare)
     parts = []
-    for number, span in enumerate(spans, start=submap.id):
+    for (number, component), span in zip(numbers, (slice(at), slice(at, None)), strict=True):
         path = _part(submap.trajectory, span)
         lines = _merged(scans[span], path.pose, path.uncertainty, parameters).line_map()
-        is_tail = span is spans[-1]
-        component = finished.spare if is_tail else submap.component
         part = replace(submap, id=number, component=component, map=lines, trajectory=path)
-        follows = finished.follows and not is_tail
-        parts.append(Finished(part, scans[span], follows, finished.spare))
+        parts.append((part, scans[span]))
     return parts
 
 

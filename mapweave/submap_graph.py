@@ -63,6 +63,11 @@ class SubmapGraph:
         covariance = _tracking_covariance(previous.trajectory, step, self._parameters)
         self._trust(Link(previous.id, submap.id, step, covariance, True), submap.trajectory.length)
 
+    def untrack(self) -> None:
+        """Take back the last `track`: it was no step, but a jump."""
+        for noted in (self._links, self._relied, self._lengths):
+            noted.pop()
+
     def join(self, older: Submap, younger: Submap) -> None:
         """Note that two components were joined, at the present poses of these two submaps."""
         p = self._parameters

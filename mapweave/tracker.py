@@ -47,8 +47,8 @@ class TrackerParameters(BaseModel):
     line_spacing: float = Field(0.1, gt=0, description="[m] between points on the map's lines")
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
     max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
-    motion_sigma: float = Field(0.5, gt=0, description="[m] of a prediction, in the alignment")
-    turn_sigma: float = Field(0.35, gt=0, description="[rad] the same for the turn")
+    prior_sigma: float = Field(0.5, gt=0, description="[m] of a prediction, in the alignment")
+    prior_turn: float = Field(0.35, gt=0, description="[rad] the same for the turn")
     open_novelty: float = Field(
         0.8, ge=0, le=1, description="what a return at a new place counts along bare walls"
     )
@@ -79,7 +79,7 @@ class Tracker:
     pose
         (3,) of the last scan that fitted [m, m, rad].
     missed
-        The scans since then, which fitted nowhere.
+        The scans since then, which fitted nowhere, or were not confirmed by the next one.
     """
 
     def __init__(self, parameters: TrackerParameters | None = None) -> None:
@@ -265,7 +265,7 @@ class Tracker:
         p = self.parameters
         surface = seen.surface
         stride = 1 + (len(surface) - 1) // p.max_points
-        prior = np.diag([p.motion_sigma**-2, p.motion_sigma**-2, p.turn_sigma**-2])
+        prior = np.diag([p.prior_sigma**-2, p.prior_sigma**-2, p.prior_turn**-2])
         thinned = surface.at(slice(None, None, stride))
         fits = align_all(thinned, self._local.target, starts, p.local_map.icp, prior)
         poses = np.array([fit.pose for fit in fits])

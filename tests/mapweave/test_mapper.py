@@ -14,7 +14,7 @@ from mapweave.assembly import assemble
 from mapweave.errors import InvalidIdError
 from mapweave.files import write_map
 from mapweave.mapper import Mapper, Placement
-from mapweave.maps import RobotMap, Submap
+from mapweave.maps import RobotMap, Submap, Trajectory
 from mapweave.readers import read_reference_poses, read_scans
 from mapweave.scan import Scan
 from mapweave.settling import Finished, Settled
@@ -236,7 +236,7 @@ class JoinsAll:
     def take(self) -> Settled:
         """Return where all are."""
         poses = np.array([s.pose for s in self._submaps])
-        return Settled(np.zeros(len(poses), dtype=np.int64), poses, (self._submaps[-1],))
+        return Settled(np.zeros(len(poses), dtype=np.int64), poses, (self._submaps[-1],), 0)
 
 
 def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> None:
@@ -254,6 +254,55 @@ def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> No
     assert len(numbers) >= 2
     assert numbers == sorted(set(numbers))
     assert mapper.finish().components == [0]
+
+
+class CutsTheSecond:
+    """Cuts the second submap in two, and leaves all else as it is."""
+
+    def __init__(self) -> None:
+        self._submaps: list[Submap] = []
+        self._settled: Settled | None = None
+
+    def begin(self, finished: Finished) -> None:
+        """Take the next submap."""
+        newest, used = finished.submap, finished.submap.component
+        renewed: tuple[Submap, ...] = (newest,)
+        if newest.id == 1:
+            used, middle = finished.spare, len(newest.trajectory.stamp) // 2
+            parts = [
+                Trajectory(t.scan_index[k], t.stamp[k], t.pose[k], None)
+                for t, k in (
+                    (newest.trajectory, slice(middle)),
+                    (newest.trajectory, slice(middle, None)),
+                )
+            ]
+            renewed = (
+                replace(newest, trajectory=parts[0]),
+                replace(newest, id=2, component=used, trajectory=parts[1]),
+            )
+        self._submaps += renewed
+        components = np.array([s.component for s in self._submaps])
+        poses = np.array([s.pose for s in self._submaps])
+        self._settled = Settled(components, poses, renewed, used)
+
+    def take(self) -> Settled | None:
+        """Return where all are."""
+        return self._settled
+
+
+def test_a_submap_that_is_cut_and_a_robot_that_is_lost_meanwhile_share_no_number() -> None:
+    mapper = Mapper("a", settling=CutsTheSecond())
+    out, _ = scans_along(BUILDING, [(1, 1), (29, 1)], 1)
+    away, _ = scans_along(OTHER_BUILDING, [(5, 1.5), (9, 1.5), (9, -3)], 2)
+    cut_at = 60  # the second submap is finished and not yet adopted
+    for k, scan in enumerate([*out[:cut_at], *away]):
+        mapper.add(Scan(k, scan.stamp, scan.angles, scan.ranges))
+    robot_map = mapper.finish()
+    assert [s.id for s in robot_map.submaps] == list(range(len(robot_map.submaps)))
+    assert len(robot_map.components) == 3
+    assert sorted(placed(robot_map))[-1] == cut_at + len(away) - 1
+    runs = [s.component for s in robot_map.submaps]
+    assert runs == sorted(runs)  # each number is one stretch of the path
 
 
 def test_a_mapper_needs_a_valid_robot_id() -> None:

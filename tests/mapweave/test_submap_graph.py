@@ -52,6 +52,13 @@ def test_a_submap_is_known_by_the_path_to_it() -> None:
     np.testing.assert_allclose(graph.lengths_from(5, 6), [50, 40, 30, 20, 10, 0])
 
 
+def test_a_step_that_is_taken_back_links_nothing() -> None:
+    graph, _ = chain(circle(6, 100), GraphParameters())
+    graph.untrack()
+    assert graph.neighbours(5) == []
+    assert graph.neighbours(4) == [3]
+
+
 def test_a_closure_that_is_relied_on_shortens_the_path() -> None:
     poses = circle(6, 6)
     graph, submaps = chain(poses, GraphParameters())
