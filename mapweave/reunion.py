@@ -26,6 +26,13 @@ class ReunionParameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     fusion: FusionParameters = FusionParameters()
+    min_confidence: float = Field(
+        0.5,
+        gt=0,
+        lt=1,
+        description="of a place where the robot lost track: that it is there needs less proof than"
+        " that it is anywhere",
+    )
     growth: float = Field(
         0.15, gt=0, description="share by which either has grown before a pair is compared again"
     )
@@ -106,7 +113,8 @@ class Reunion:
         possible = _about_breaks(submaps, older, younger, breaks, p)
         if anywhere.decision == "accepted" or len(possible) == 0:
             return anywhere
-        here = compare(names[0], first, names[1], second, p.fusion, possible)
+        expected = p.fusion.model_copy(update={"min_confidence": p.min_confidence})
+        here = compare(names[0], first, names[1], second, expected, possible)
         # A better place elsewhere says that it was carried away.
         best = max(anywhere.evidence.get("score", 0.0), 0.0)
         return here if here.evidence.get("score", 0.0) >= 0.95 * best else anywhere
