@@ -39,10 +39,11 @@ class AcceptanceParameters(BaseModel):
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
     held: float = Field(
-        3.0, gt=0, description="points that hold a pose in every direction, after a miss"
+        2.5, gt=0, description="points that hold a pose in every direction, after a miss"
     )
     expected: float = Field(0.02, ge=0, description="surprise up to which a pose is expected")
     expected_dispute: float = Field(0.15, ge=0, description="disputed share of one, at most")
+    undisputed: float = Field(0.05, ge=0, description="disputed share of one, after a miss")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,12 +81,15 @@ def is_credible(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
 
 
 def is_found_again(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
-    """Whether a pose counts after a miss: it explains half, and is held in every direction.
+    """Whether a pose counts after a miss: held in every direction, and better than look-alikes.
 
-    The robot may be anywhere, and along bare walls look-alikes fit as well.
+    The robot may be anywhere. So it must explain half of what is seen; or the robot should be there
+    and hardly anything speaks against it.
     """
-    p, held = parameters, np.linalg.eigvalsh(tracked.information[:2, :2])[0]
-    return bool(held >= p.held and tracked.evidence.score >= p.acceptable)
+    p, evidence = parameters, tracked.evidence
+    held = np.linalg.eigvalsh(tracked.information[:2, :2])[0]
+    undisputed = evidence.disputed <= p.undisputed and tracked.surprise <= p.expected
+    return bool(held >= p.held and (evidence.score >= p.acceptable or undisputed))
 
 
 def is_acceptable(
