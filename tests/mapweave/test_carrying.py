@@ -93,3 +93,12 @@ def test_submaps_without_walls_break_nothing() -> None:
     empty = robot("b", np.zeros(3), lines=LineMap.empty())
     moved = carry(alignment(FOUND), still(A), Change(places_of(empty), corrected(empty, 0)))
     assert np.isfinite(moved.transform).all()
+
+
+def test_a_submap_that_took_the_id_of_one_that_was_cut_is_another() -> None:
+    """It lies elsewhere, and the alignment does not go there with it."""
+    path = Trajectory(np.array([40]), np.zeros(1), np.zeros((1, 3)))
+    submaps = (B.submaps[0], replace(B.submaps[1], trajectory=path))
+    other = corrected(replace(B, submaps=submaps), 1)
+    found = alignment(FOUND)
+    assert carry(found, still(A), Change(places_of(B), other)) is found
