@@ -29,6 +29,9 @@ class PaceParameters(BaseModel):
     held: float = Field(3.0, gt=0, description="points that hold a determined step")
     spread: float = Field(2.5, gt=0, description="sigma, in medians of what steps are off")
     min_sigma: float = Field(0.1, gt=0, description="[m] of a step against the expected one")
+    faster: float = Field(
+        1.5, ge=1, description="than its longest remembered step, that a robot may go unseen"
+    )
     max_sigma: float = Field(
         0.5, gt=0, description="[m] as long as nothing is known, after a miss, and by odometry"
     )
@@ -99,6 +102,12 @@ class Pace:
             return self._last[:2], p.max_sigma
         sigma = p.spread * float(np.median(self._off)) if len(self._off) > p.steps else p.max_sigma
         return np.median(alike, axis=0), float(np.clip(sigma, p.min_sigma, p.max_sigma))
+
+    def reach(self, steps: int) -> float:
+        """Return how far [m] a robot comes in so many steps, were each as long as its longest."""
+        p = self._p
+        longest = max((float(np.hypot(*step[:2])) for step in self._steps), default=np.inf)
+        return steps * p.faster * longest + p.max_sigma
 
     def add(self, step: FloatArray, information: FloatArray) -> None:
         """Take a step (3,), and the (3, 3) information that held it, in units of one point."""

@@ -218,6 +218,8 @@ class Tracker:
         """
         p, missed = self.parameters, len(self.missed)
         reach = p.max_step * (1 + missed / 2)  # missed scans took time
+        if missed:
+            reach = min(reach, self._pace.reach(1 + missed))
         return [
             t
             for t in self._aligned(seen, starts)

@@ -79,3 +79,9 @@ def test_a_copy_goes_on_by_itself() -> None:
         other.add(np.array([0.9, 0.0, 0.01]), HELD)
     np.testing.assert_allclose(pace.way(0.0)[0], STRAIGHT[:2])
     np.testing.assert_allclose(other.way(0.0)[0], [0.9, 0.0])
+
+
+def test_unseen_a_robot_comes_no_farther_than_it_might_have_gone() -> None:
+    pace = paced(*[STRAIGHT] * 12)
+    assert 3 * 0.5 < pace.reach(3) < 3 * 1.0
+    assert Pace(PaceParameters()).reach(1) == np.inf
