@@ -26,7 +26,8 @@ class DepartureParameters(BaseModel):
         12.0,
         gt=0,
         description="[m] of wall contradicted, of a submap and the older ones together; rightly"
-        " tracked ones of the Intel, CSAIL and Freiburg logs have at most 5 m, after a jump 26-79 m",
+        " tracked ones of the Intel, CSAIL and Freiburg logs have 5 m at most, after a jump"
+        " 26-79 m",
     )
     share: float = Field(
         0.2, gt=0, lt=1, description="of the wall that both looked at, contradicted"
