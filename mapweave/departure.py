@@ -3,16 +3,23 @@
 Carried off into a look-alike, a robot follows what it sees as if nothing had happened. What it maps
 from there on contradicts the older submaps of the place where it believes to be, at every pose
 within the drift. Tracking that is right contradicts next to nothing.
+
+In a corridor that is like another one, it takes more than one submap until that is certain; then
+those before it are asked as well from where on they are refuted.
 """
 
+from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
+from mapweave.loop_closing import Comparison
 from mapweave.map_raster import MapRaster
+from mapweave.maps import Submap
 from mapweave.surface import Surface
 from mapweave.verification import Verdict
 
@@ -38,6 +45,83 @@ class DepartureParameters(BaseModel):
     doubtful: float = Field(
         0.08, gt=0, lt=1, description="share of a scan's returns refuted, from which it departs"
     )
+    recent: int = Field(3, ge=1, description="submaps in a row that are asked, the last ones")
+
+
+@dataclass(frozen=True, slots=True)
+class Departure:
+    """From which scan on, of which submap, by its id, a robot is not where tracking has it."""
+
+    submap: int
+    scan: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """The scans of a submap, and the older submaps that looked at what they saw."""
+
+    id: int
+    surfaces: list[Surface]
+    older: list[tuple[int, MapRaster]]
+
+
+class Departures:
+    """Remembers the last submaps that were tracked from one another."""
+
+    def __init__(self, parameters: DepartureParameters) -> None:
+        self._p = parameters
+        self._recent: deque[_Asked] = deque(maxlen=parameters.recent)
+
+    def find(
+        self,
+        submaps: Sequence[Submap],
+        surfaces: Sequence[Surface],
+        compared: Sequence[Comparison],
+        follows: bool,
+    ) -> Departure | None:
+        """Return where the robot departed from what it mapped before, if it did.
+
+        Parameters
+        ----------
+        submaps
+            All; the last one is new.
+        surfaces
+            Oriented points of its scans, sensor frame.
+        compared
+            What comparing it with the older ones came to.
+        follows
+            Whether it was tracked from the one before.
+        """
+        if not follows:
+            self.forget()
+        older = [(c.older.id, c.raster) for c in compared]
+        self._recent.append(_Asked(submaps[-1].id, list(surfaces), older))
+        if not (follows and departs([c.verdict for c in compared], self._p)):
+            return None
+        return self._first(submaps)
+
+    def forget(self) -> None:
+        """Ask none of the submaps so far again, as when others have come to hang on them."""
+        self._recent.clear()
+
+    def _first(self, submaps: Sequence[Submap]) -> Departure | None:
+        """Return the first scan that departs; of an earlier submap that is its first or none."""
+        refuted = [self._refuted(asked, submaps) for asked in self._recent]
+        at = departing(np.concatenate(refuted), self._p)
+        for asked, shares in zip(self._recent, refuted, strict=True):
+            if at < len(shares):
+                newest = asked is self._recent[-1]
+                if newest or at <= len(shares) // 2:
+                    return Departure(asked.id, at if newest else 0)
+                return Departure(asked.id + 1, 0)
+            at -= len(shares)
+        return None
+
+    def _refuted(self, asked: _Asked, submaps: Sequence[Submap]) -> FloatArray:
+        """(n,) share of the returns of each scan that the older submaps refute."""
+        submap = submaps[asked.id]
+        older = [(raster, se2.between(submaps[k].pose, submap.pose)) for k, raster in asked.older]
+        return refuted(asked.surfaces, submap.trajectory.pose, older, self._p)
 
 
 def departs(verdicts: Sequence[Verdict], parameters: DepartureParameters) -> bool:
@@ -48,13 +132,25 @@ def departs(verdicts: Sequence[Verdict], parameters: DepartureParameters) -> boo
     return contradicted > parameters.contradicted and share > parameters.share
 
 
-def departure(
+def departing(shares: FloatArray, parameters: DepartureParameters) -> int:
+    """Return the first of n scans that departs, so that those before are refuted least; n if none.
+
+    Parameters
+    ----------
+    shares
+        (n,) of the returns of each scan that are refuted.
+    """
+    doubt = np.concatenate([[0.0], np.cumsum(shares - parameters.doubtful)])
+    return int(np.argmin(doubt))
+
+
+def refuted(
     surfaces: Sequence[Surface],
     poses: FloatArray,
     older: Sequence[tuple[MapRaster, FloatArray]],
     parameters: DepartureParameters,
-) -> int:
-    """Return the first of n scans that departs, so that those before are refuted least; n if none.
+) -> FloatArray:
+    """(n,) share of the returns of each scan that lie where older maps saw through.
 
     Parameters
     ----------
@@ -65,10 +161,8 @@ def departure(
     older
         What was mapped before, each with the (3,) pose of that frame in its own.
     """
-    p = parameters
-    refuted = [_refuted(s, pose, older, p) for s, pose in zip(surfaces, poses, strict=True)]
-    doubt = np.concatenate([[0.0], np.cumsum(np.array(refuted) - p.doubtful)])
-    return int(np.argmin(doubt))
+    shares = [_refuted(s, pose, older, parameters) for s, pose in zip(surfaces, poses, strict=True)]
+    return np.array(shares)
 
 
 def _refuted(

@@ -8,6 +8,7 @@ for where the robot was when it lost track of the one before; what both saw deci
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -37,6 +38,9 @@ class ReunionParameters(BaseModel):
         0.15, gt=0, description="share by which either has grown before a pair is compared again"
     )
     reach: float = Field(3.0, gt=0, description="[m] that a robot came while it was lost, at most")
+    max_reach: float = Field(
+        6.0, gt=0, description="[m] the same with components in between, their paths included"
+    )
     step: float = Field(0.3, gt=0, description="[m] between the places tried there")
     turn_step: float = Field(0.06, gt=0, description="[rad] between the headings tried there")
     place: float = Field(2.0, gt=0, description="[m] within which the middles of submaps are alike")
@@ -53,15 +57,13 @@ class Reunion:
         self._compared: dict[tuple[int, int], tuple[float, float]] = {}
         self._shapes: dict[int, tuple[object, Shape | None]] = {}
 
-    def reunite(
-        self, submaps: Sequence[Submap], breaks: Sequence[int] = ()
-    ) -> tuple[list[Submap], list[tuple[int, int]]]:
+    def reunite(self, submaps: Sequence[Submap]) -> tuple[list[Submap], list[tuple[int, int]]]:
         """Join every component to an older one where the shapes prove it.
 
         Parameters
         ----------
-        breaks
-            Ids of submaps, from 1 on, not tracked from the one before: there track was lost.
+        submaps
+            In the order in which they were seen.
 
         Returns
         -------
@@ -76,7 +78,7 @@ class Reunion:
         joints: list[tuple[int, int]] = []
         for younger in sorted({s.component for s in submaps})[1:]:
             for older in sorted({s.component for s in joined if s.component < younger}):
-                after = self._joined(joined, older, younger, breaks)
+                after = self._joined(joined, older, younger)
                 if after is not None:
                     of_younger = {s.id for s in joined if s.component == younger}
                     joints.append(_nearest(after, older, of_younger))
@@ -85,15 +87,13 @@ class Reunion:
                     break
         return joined, joints
 
-    def _joined(
-        self, submaps: Sequence[Submap], older: int, younger: int, breaks: Sequence[int]
-    ) -> list[Submap] | None:
+    def _joined(self, submaps: Sequence[Submap], older: int, younger: int) -> list[Submap] | None:
         """Return `submaps` with two components as one, where their shapes prove it."""
         walls = _wall(submaps, older), _wall(submaps, younger)
         if not self._is_due((older, younger), walls):
             return None
         self._compared[older, younger] = walls
-        alignment = self._compare(submaps, older, younger, breaks)
+        alignment = self._compare(submaps, older, younger)
         if alignment.decision != "accepted":
             return None
         return [
@@ -103,14 +103,12 @@ class Reunion:
             for s in submaps
         ]
 
-    def _compare(
-        self, submaps: Sequence[Submap], older: int, younger: int, breaks: Sequence[int]
-    ) -> Alignment:
-        """Compare two components: by shape, and where that leaves it open, about the break."""
+    def _compare(self, submaps: Sequence[Submap], older: int, younger: int) -> Alignment:
+        """Compare two components: by shape, and where that leaves it open, where track was lost."""
         first, second = self._shape(submaps, older), self._shape(submaps, younger)
         names, p = ("older", "younger"), self._p
         anywhere = compare(names[0], first, names[1], second, p.fusion)
-        possible = _about_breaks(submaps, older, younger, breaks, p)
+        possible = _between_them(submaps, older, younger, p)
         if anywhere.decision == "accepted" or len(possible) == 0:
             return anywhere
         expected = p.fusion.model_copy(update={"min_confidence": p.min_confidence})
@@ -151,32 +149,46 @@ def _covering(inside: Sequence[Submap], p: ReunionParameters) -> list[Submap]:
     return [submap for submap, _ in reversed(kept)]
 
 
-def _about_breaks(
-    submaps: Sequence[Submap],
-    older: int,
-    younger: int,
-    breaks: Sequence[int],
-    p: ReunionParameters,
+def _between_them(
+    submaps: Sequence[Submap], older: int, younger: int, p: ReunionParameters
 ) -> FloatArray:
-    """(n, 3) transforms from `younger` to `older` by which the robot did not leap at a break."""
-    moves = _moves(p)
+    """(n, 3) transforms from `younger` to `older` by which the robot did not leap between them.
+
+    Wherever one ended and the other is the next of the two; what it saw meanwhile may be in pieces
+    too small to be joined.
+    """
+    seen = [
+        (k, s)
+        for k, s in enumerate(submaps)
+        if s.component in (older, younger) and len(s.trajectory.pose)
+    ]
     found = [np.empty((0, 3))]
-    for number in breaks:
-        before, after = submaps[number - 1], submaps[number]
+    for (k, before), (m, after) in pairwise(seen):
+        if before.component == after.component:
+            continue
+        moves = _moves(_lost_for(submaps[k + 1 : m], p), p)
         last, first = _pose(before, -1), _pose(after, 0)
-        if (before.component, after.component) == (older, younger):
+        if before.component == older:
             found.append(se2.compose(se2.compose(last, moves), se2.inverse(first)))
-        elif (before.component, after.component) == (younger, older):
+        else:
             found.append(se2.compose(first, se2.compose(se2.inverse(moves), se2.inverse(last))))
     return np.concatenate(found)
 
 
-def _moves(p: ReunionParameters) -> FloatArray:
-    """(n, 3) all that a robot may have moved while it was lost [m, m, rad]."""
-    shifts = np.linspace(-p.reach, p.reach, 2 * int(np.ceil(p.reach / p.step)) + 1)
+def _lost_for(pieces: Sequence[Submap], p: ReunionParameters) -> float:
+    """[m] that a robot may have come while it was lost, these pieces of its path included."""
+    components = len({s.component for s in pieces})
+    return p.reach * (1 + components) + sum(s.trajectory.length for s in pieces)
+
+
+def _moves(reach: float, p: ReunionParameters) -> FloatArray:
+    """(n, 3) all moves of a robot that came no farther than `reach` [m, m, rad]; none beyond it."""
+    if reach > p.max_reach:
+        return np.empty((0, 3))
+    shifts = np.linspace(-reach, reach, 2 * int(np.ceil(reach / p.step)) + 1)
     turns = np.arange(-np.pi, np.pi, p.turn_step)
     x, y, turn = (a.ravel() for a in np.meshgrid(shifts, shifts, turns, indexing="ij"))
-    within = np.hypot(x, y) <= p.reach
+    within = np.hypot(x, y) <= reach
     moves: FloatArray = np.column_stack([x, y, turn])[within]
     return moves
 

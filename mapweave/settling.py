@@ -15,8 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import FloatArray, IntArray
-from mapweave.departure import DepartureParameters, departs, departure
-from mapweave.loop_closing import Comparison, LoopCloser, LoopParameters
+from mapweave.departure import Departure, DepartureParameters, Departures
+from mapweave.loop_closing import LoopCloser, LoopParameters
 from mapweave.maps import LineMap, Submap, Trajectory
 from mapweave.observation import Observation
 from mapweave.refinement import RefinementParameters, refine
@@ -113,8 +113,8 @@ class Settler:
         self._parameters = parameters
         self._submaps: list[Submap] = []
         self._reunion = Reunion(parameters.reunion)
-        self._breaks: list[int] = []  # ids of submaps that were not tracked from the one before
         self._loops = LoopCloser(parameters.loops)
+        self._departures = Departures(parameters.departure)
         self._settled: Settled | None = None
 
     def begin(self, finished: Finished) -> None:
@@ -131,17 +131,18 @@ class Settler:
         submaps = [*self._submaps, finished.submap]
         if finished.follows and count:
             self._loops.graph.track(submaps[-2], submaps[-1])
-        elif count:
-            self._breaks.append(finished.submap.id)
         compared = self._loops.compare(submaps)
+        surfaces = [seen.surface for seen in finished.scans]
+        at = self._departures.find(submaps, surfaces, compared, finished.follows and count > 0)
         parts = [(finished.submap, finished.scans)]
-        at = self._departure(finished, compared)
         if at is not None:
             parts = _cut(finished, at, self._parameters.submap)
-            submaps = self._departed(submaps, [part for part, _ in parts])
-        submaps, joints = self._reunion.reunite(submaps, self._breaks)
+            submaps = self._departed(submaps, at, [part for part, _ in parts])
+        submaps, joints = self._reunion.reunite(submaps)
         for older, younger in joints:
             self._loops.graph.join(submaps[older], submaps[younger])
+        if joints or at is not None:
+            self._departures.forget()
         submaps = self._loops.close(submaps, compared if at is None and not joints else None)
         renewed = [
             self._refined(submaps, submaps[count + k], scans) for k, (_, scans) in enumerate(parts)
@@ -152,25 +153,17 @@ class Settler:
         newest = finished.submap.component if at is None else finished.spare
         return Settled(component, poses, tuple(renewed), newest)
 
-    def _departed(self, submaps: Sequence[Submap], parts: Sequence[Submap]) -> list[Submap]:
-        """Return `submaps`, the last in `parts`: nothing tracks the last of these from before."""
-        *older, _ = submaps
-        self._breaks.append(parts[-1].id)
-        if len(parts) == 1:
-            self._loops.graph.untrack()
-            return [*older, *parts]
-        return [*self._loops.close([*older, parts[0]]), parts[1]]
-
-    def _departure(self, finished: Finished, compared: Sequence[Comparison]) -> int | None:
-        """Return from which of its scans on a submap is not where tracking has it, if any."""
-        p = self._parameters.departure
-        if not finished.follows or not departs([c.verdict for c in compared], p):
-            return None
-        frame = finished.submap.pose
-        older = [(c.raster, se2.between(c.older.pose, frame)) for c in compared]
-        surfaces = [seen.surface for seen in finished.scans]
-        at = departure(surfaces, finished.submap.trajectory.pose, older, p)
-        return at if at < len(finished.scans) else None
+    def _departed(
+        self, submaps: Sequence[Submap], at: Departure, parts: Sequence[Submap]
+    ) -> list[Submap]:
+        """Return `submaps`, the last in `parts`: none of those from `at` on is tracked to there."""
+        *older, newest = submaps
+        if len(parts) == 2:
+            return [*self._loops.close([*older, parts[0]]), parts[1]]
+        self._loops.graph.part(range(at.submap, newest.id + 1))
+        component = parts[0].component
+        gone = [replace(s, component=component) for s in older[at.submap :]]
+        return [*older[: at.submap], *gone, *parts]
 
     def _refined(
         self, submaps: Sequence[Submap], newest: Submap, scans: Sequence[Observation]
@@ -189,18 +182,19 @@ class Settler:
 
 
 def _cut(
-    finished: Finished, at: int, parameters: SubmapParameters
+    finished: Finished, at: Departure, parameters: SubmapParameters
 ) -> list[tuple[Submap, tuple[Observation, ...]]]:
-    """Return the parts of a submap before and from scan `at` on, each with its scans.
+    """Return the parts of a submap before and from `at` on, each with its scans.
 
     The latter is in a component anew; the former is left out where it is empty.
     """
     submap, scans = finished.submap, finished.scans
-    if at == 0:
+    if at.submap < submap.id or at.scan == 0:
         return [(replace(submap, component=finished.spare), scans)]
     numbers = (submap.id, submap.component), (submap.id + 1, finished.spare)
+    spans = slice(at.scan), slice(at.scan, None)
     parts = []
-    for (number, component), span in zip(numbers, (slice(at), slice(at, None)), strict=True):
+    for (number, component), span in zip(numbers, spans, strict=True):
         path = _part(submap.trajectory, span)
         lines = _merged(scans[span], path.pose, path.uncertainty, parameters).line_map()
         part = replace(submap, id=number, component=component, map=lines, trajectory=path)

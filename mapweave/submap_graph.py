@@ -4,7 +4,7 @@ However many submaps there are, a closure moves those around it: what is many li
 unless the loop that was closed is a long one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,10 +63,14 @@ class SubmapGraph:
         covariance = _tracking_covariance(previous.trajectory, step, self._parameters)
         self._trust(Link(previous.id, submap.id, step, covariance, True), submap.trajectory.length)
 
-    def untrack(self) -> None:
-        """Take back the last `track`: it was no step, but a jump."""
-        for noted in (self._links, self._relied, self._lengths):
-            noted.pop()
+    def part(self, submaps: Collection[int]) -> None:
+        """Forget all links between `submaps`, by their ids, and the others: they are elsewhere."""
+        kept = [
+            k for k, e in enumerate(self._links) if (e.first in submaps) == (e.second in submaps)
+        ]
+        self._links = [self._links[k] for k in kept]
+        self._relied = [self._relied[k] for k in kept]
+        self._lengths = [self._lengths[k] for k in kept]
 
     def join(self, older: Submap, younger: Submap) -> None:
         """Note that two components were joined, at the present poses of these two submaps."""

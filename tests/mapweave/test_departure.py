@@ -6,9 +6,18 @@ from numpy.random import Generator
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
-from mapweave.departure import DepartureParameters, departs, departure
+from mapweave.departure import (
+    Departure,
+    DepartureParameters,
+    Departures,
+    departing,
+    departs,
+    refuted,
+)
+from mapweave.loop_closing import Comparison
 from mapweave.map_raster import MapRaster, RasterParameters
 from mapweave.mapper import Mapper
+from mapweave.maps import LineMap, Submap, Trajectory
 from mapweave.observation import ObservationParameters, observe
 from mapweave.scan import Scan
 from mapweave.verification import Verdict
@@ -45,7 +54,7 @@ def first_departed(scans: list[Scan], poses: FloatArray, frame: FloatArray) -> i
     raster = MapRaster.of(part(BUILDING, 0, 30), RasterParameters())
     surfaces = [observe(scan, ObservationParameters()).surface for scan in scans]
     local = se2.compose(se2.inverse(frame), poses)
-    return departure(surfaces, local, [(raster, frame)], P)
+    return departing(refuted(surfaces, local, [(raster, frame)], P), P)
 
 
 def test_scans_where_they_are_believed_to_be_do_not_depart(rng: Generator) -> None:
@@ -61,6 +70,49 @@ def test_the_first_scan_that_was_taken_elsewhere_departs(at: int, rng: Generator
     there = seen_at(OTHER_BUILDING, poses[at:] + np.array([5.0, -3.0, 0.9]), rng)
     frame = np.array([4.0, -2.0, 1.0])
     assert abs(first_departed([*here, *there], poses, frame) - at) <= 1
+
+
+def departure_of(here: int, elsewhere: int, rng: Generator, forget: bool = False) -> Departure:
+    """Drive 8 scans a submap; from the last `elsewhere` on in another building than believed.
+
+    Only of the last of the submaps, number `here`, are comparisons enough to say so.
+    """
+    raster = MapRaster.of(part(BUILDING, 0, 30), RasterParameters())
+    count = 8 * here
+    poses = np.array([[2.0 + 0.3 * k, 1.0, 0.1] for k in range(count)])
+    scans = seen_at(BUILDING, poses[: count - elsewhere], rng)
+    scans += seen_at(OTHER_BUILDING, poses[count - elsewhere :] + np.array([5.0, -3.0, 0.9]), rng)
+    surfaces = [observe(scan, ObservationParameters()).surface for scan in scans]
+    known = Submap(0, 0, se2.IDENTITY, part(BUILDING, 0, 30), Trajectory.empty())
+    submaps, departures, found = [known], Departures(P), None
+    for number in range(1, here + 1):
+        span = slice(8 * (number - 1), 8 * number)
+        local = se2.between(poses[span][0], poses[span])
+        path = Trajectory(np.arange(8), np.zeros(8), local, None)
+        submaps.append(Submap(number, 0, poses[span][0], LineMap.empty(), path))
+        said = verdict(20, 20) if number == here else verdict(20, 4)
+        compared = [Comparison(known, raster, said, None)]
+        found = departures.find(submaps, surfaces[span], compared, follows=True)
+        if forget:
+            departures.forget()
+        assert (found is None) == (number < here)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("elsewhere", "expected"), [(3, (3, 5)), (8, (3, 0)), (10, (3, 0)), (14, (2, 0)), (16, (2, 0))]
+)
+def test_a_departure_that_took_long_to_be_certain_is_found_in_an_earlier_submap(
+    elsewhere: int, expected: tuple[int, int], rng: Generator
+) -> None:
+    """To the submap: in one that was finished before, none is cut in two."""
+    found = departure_of(3, elsewhere, rng)
+    assert (found.submap, found.scan) == expected
+
+
+def test_submaps_that_others_hang_on_are_not_asked_again(rng: Generator) -> None:
+    assert departure_of(3, 16, rng, forget=True) == Departure(3, 0)
 
 
 NICHES = ((4.0, 1.5, 0.8), (7.0, 2.5, 2.5), (11.5, 1.0, 1.6))

@@ -1,5 +1,7 @@
 """A robot's components become one where their shapes prove it, and only there (paper, II)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.random import Generator
@@ -109,6 +111,11 @@ def broken(parts: list[LineMap], gap: FloatArray) -> list[Submap]:
     ]
 
 
+def by_shape_alone() -> Reunion:
+    """Return one that looks nowhere in particular."""
+    return Reunion(ReunionParameters(max_reach=0.01))
+
+
 def trajectory(pose: FloatArray) -> Trajectory:
     return Trajectory(np.arange(len(pose)), np.zeros(len(pose)), pose, None)
 
@@ -125,10 +132,25 @@ def test_a_robot_that_lost_track_is_looked_for_where_it_lost_it(rng: Generator) 
     """Shapes alone leave two places open; the robot did not leap 14 m."""
     parts = [shaken(part(TWINS, 8, 40), rng), shaken(part(TWINS, 12, 22), rng)]
     submaps = broken(parts, np.array([0.8, 0.2, 0.3]))
-    assert Reunion().reunite(submaps)[1] == []
-    joined, joints = Reunion().reunite(submaps, breaks=[1])
+    assert by_shape_alone().reunite(submaps)[1] == []
+    joined, joints = Reunion().reunite(submaps)
     assert joints == [(0, 1)]
     np.testing.assert_allclose(joined[1].pose, [19.86, 1.2, 0.3], atol=0.15)
+
+
+@pytest.mark.parametrize(("steps", "joint"), [(1, [(0, 2)]), (8, [])])
+def test_what_was_seen_in_between_in_pieces_does_not_hide_where_track_was_lost(
+    rng: Generator, steps: int, joint: list[tuple[int, int]]
+) -> None:
+    """A piece that nothing is known of: the robot came no farther than its path and two gaps."""
+    parts = [shaken(part(TWINS, 8, 40), rng), shaken(part(TWINS, 12, 22), rng)]
+    before, after = broken(parts, np.array([1.8, 0.2, 0.3]))
+    path = np.outer(np.arange(2 * steps), [0.5, 0.0, 0.0])
+    piece = Submap(1, 1, np.zeros(3), LineMap.empty(), trajectory(path))
+    after = replace(after, id=2, component=2)
+    assert by_shape_alone().reunite([before, piece, after])[1] == []
+    parameters = ReunionParameters(max_reach=7.0)
+    assert Reunion(parameters).reunite([before, piece, after])[1] == joint
 
 
 def test_a_robot_that_was_carried_away_is_not_believed_to_be_where_it_was(rng: Generator) -> None:
@@ -147,8 +169,8 @@ def test_a_robot_that_was_carried_away_is_not_believed_to_be_where_it_was(rng: G
         Submap(0, 0, before.pose, before.map, trajectory(last[None])),
         Submap(1, 1, np.zeros(3), after.map, trajectory(np.zeros((1, 3)))),
     ]
-    assert Reunion().reunite(submaps)[1] == []  # two places are like that
-    assert Reunion().reunite(submaps, breaks=[1])[1] == []
+    assert by_shape_alone().reunite(submaps)[1] == []  # two places are like that
+    assert Reunion().reunite(submaps)[1] == []
 
 
 def test_however_often_a_place_was_seen_comparing_it_costs_no_more(parts: list[LineMap]) -> None:

@@ -52,11 +52,13 @@ def test_a_submap_is_known_by_the_path_to_it() -> None:
     np.testing.assert_allclose(graph.lengths_from(5, 6), [50, 40, 30, 20, 10, 0])
 
 
-def test_a_step_that_is_taken_back_links_nothing() -> None:
-    graph, _ = chain(circle(6, 100), GraphParameters())
-    graph.untrack()
-    assert graph.neighbours(5) == []
-    assert graph.neighbours(4) == [3]
+def test_submaps_that_are_elsewhere_hang_on_each_other_alone() -> None:
+    poses = circle(6, 100)
+    graph, submaps = chain(poses, GraphParameters())
+    graph.close(submaps, [closure(0, 5, poses)])
+    graph.part({4, 5})
+    assert [graph.neighbours(k) for k in (0, 3, 4, 5)] == [[1], [2], [5], [4]]
+    np.testing.assert_array_equal(graph.lengths_from(3, 6)[4:], np.inf)
 
 
 def test_a_closure_that_is_relied_on_shortens_the_path() -> None:
