@@ -105,17 +105,16 @@ class Departures:
         self._recent.clear()
 
     def _first(self, submaps: Sequence[Submap]) -> Departure | None:
-        """Return the first scan that departs; of an earlier submap that is its first or none."""
-        refuted = [self._refuted(asked, submaps) for asked in self._recent]
-        at = departing(np.concatenate(refuted), self._p)
-        for asked, shares in zip(self._recent, refuted, strict=True):
-            if at < len(shares):
-                newest = asked is self._recent[-1]
-                if newest or at <= len(shares) // 2:
-                    return Departure(asked.id, at if newest else 0)
-                return Departure(asked.id + 1, 0)
-            at -= len(shares)
-        return None
+        """Return the scan that departs, if any; of an earlier submap than the newest, its first."""
+        shares = [self._refuted(asked, submaps) for asked in self._recent]
+        starts = np.cumsum([0, *map(len, shares[:-1])])
+        newest = starts[-1] + np.arange(1, len(shares[-1]) + 1)
+        doubt = doubts(np.concatenate(shares), self._p)
+        at = min([*starts.tolist(), *newest.tolist()], key=lambda k: doubt[k])
+        if at == len(doubt) - 1:
+            return None
+        k = int(np.searchsorted(starts, at, side="right")) - 1
+        return Departure(self._recent[k].id, at - int(starts[k]))
 
     def _refuted(self, asked: _Asked, submaps: Sequence[Submap]) -> FloatArray:
         """(n,) share of the returns of each scan that the older submaps refute."""
@@ -132,16 +131,15 @@ def departs(verdicts: Sequence[Verdict], parameters: DepartureParameters) -> boo
     return contradicted > parameters.contradicted and share > parameters.share
 
 
-def departing(shares: FloatArray, parameters: DepartureParameters) -> int:
-    """Return the first of n scans that departs, so that those before are refuted least; n if none.
+def doubts(shares: FloatArray, parameters: DepartureParameters) -> FloatArray:
+    """(n + 1,) how much speaks against departing at each of n scans, or after them: least is best.
 
     Parameters
     ----------
     shares
         (n,) of the returns of each scan that are refuted.
     """
-    doubt = np.concatenate([[0.0], np.cumsum(shares - parameters.doubtful)])
-    return int(np.argmin(doubt))
+    return np.concatenate([[0.0], np.cumsum(shares - parameters.doubtful)])
 
 
 def refuted(

@@ -60,7 +60,7 @@ def agreed(
     pairs = list(itertools.combinations(range(len(found)), 2))
     between = [(middles[i] + middles[j]) / 2 for i, j in pairs]
     errors = [
-        _difference(found[i].transform, found[j].transform, middle)
+        difference(found[i].transform, found[j].transform, middle)
         for (i, j), middle in zip(pairs, between, strict=True)
     ]
     spread, turn = np.max(errors, axis=0)
@@ -72,7 +72,7 @@ def agreed(
     return replace(best, reason=f"{told}: {best.reason}", evidence=evidence)
 
 
-def _difference(one: FloatArray, other: FloatArray, middle: FloatArray) -> tuple[float, float]:
+def difference(one: FloatArray, other: FloatArray, middle: FloatArray) -> tuple[float, float]:
     """By how much two transforms (3,) differ at `middle` (2,) [m], [rad]."""
     apart = se2.transform_points(one, middle) - se2.transform_points(other, middle)
     return float(np.hypot(*apart)), float(abs(se2.wrap(one[2] - other[2])))

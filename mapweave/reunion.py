@@ -19,6 +19,7 @@ from mapweave.assembly import place, unite_lines
 from mapweave.fusion import FusionParameters, compare, prepare
 from mapweave.hypotheses import Shape
 from mapweave.maps import Alignment, Submap
+from mapweave.recognition import Recognition, RecognitionParameters
 
 
 class ReunionParameters(BaseModel):
@@ -27,6 +28,7 @@ class ReunionParameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     fusion: FusionParameters = FusionParameters()
+    recognition: RecognitionParameters = RecognitionParameters()
     min_confidence: float = Field(
         0.5,
         gt=0,
@@ -56,6 +58,7 @@ class Reunion:
         self._p = parameters or ReunionParameters()
         self._compared: dict[tuple[int, int], tuple[float, float]] = {}
         self._shapes: dict[int, tuple[object, Shape | None]] = {}
+        self._recognition = Recognition(self._p.recognition, self._p.fusion)
 
     def reunite(self, submaps: Sequence[Submap]) -> tuple[list[Submap], list[tuple[int, int]]]:
         """Join every component to an older one where the shapes prove it.
@@ -71,8 +74,8 @@ class Reunion:
             In the same order, with their new components and poses.
         joints
             For each join, the ids of a submap of the older and one of the younger component:
-            those whose walls are nearest, because there the shapes were compared, and what
-            tracking did to the rest of either component is not the join's.
+            those that are nearest where the shapes were compared, because what tracking did to the
+            rest of either component is not the join's.
         """
         joined = list(submaps)
         joints: list[tuple[int, int]] = []
@@ -83,9 +86,37 @@ class Reunion:
                     of_younger = {s.id for s in joined if s.component == younger}
                     joints.append(_nearest(after, older, of_younger))
                     joined = after
-                    self._shapes.pop(younger, None)
                     break
-        return joined, joints
+        return (joined, joints) if joints else self._recognised(joined)
+
+    def _recognised(self, submaps: list[Submap]) -> tuple[list[Submap], list[tuple[int, int]]]:
+        """Join the component of the newest submap to another one where it is found in it."""
+        if not submaps:
+            return submaps, []
+        newest = submaps[-1]
+        found = self._recognition.look(submaps, lambda component: self._shape(submaps, component))
+        if found is None:
+            return submaps, []
+        here, there = newest.component, found.component
+        if here < there:
+            joined = self._moved(submaps, here, there, se2.inverse(found.transform))
+        else:
+            joined = self._moved(submaps, there, here, found.transform)
+        of_there = {s.id for s in submaps if s.component == there}
+        nearest = _nearest_to(newest.id, joined, of_there)
+        return joined, [(newest.id, nearest) if here < there else (nearest, newest.id)]
+
+    def _moved(
+        self, submaps: Sequence[Submap], older: int, younger: int, transform: FloatArray
+    ) -> list[Submap]:
+        """Return `submaps`, those of `younger` in `older`, to which `transform` (3,) takes them."""
+        self._shapes.pop(younger, None)
+        return [
+            replace(s, component=older, pose=se2.compose(transform, s.pose))
+            if s.component == younger
+            else s
+            for s in submaps
+        ]
 
     def _joined(self, submaps: Sequence[Submap], older: int, younger: int) -> list[Submap] | None:
         """Return `submaps` with two components as one, where their shapes prove it."""
@@ -96,12 +127,7 @@ class Reunion:
         alignment = self._compare(submaps, older, younger)
         if alignment.decision != "accepted":
             return None
-        return [
-            replace(s, component=older, pose=se2.compose(alignment.transform, s.pose))
-            if s.component == younger
-            else s
-            for s in submaps
-        ]
+        return self._moved(submaps, older, younger, alignment.transform)
 
     def _compare(self, submaps: Sequence[Submap], older: int, younger: int) -> Alignment:
         """Compare two components: by shape, and where that leaves it open, where track was lost."""
@@ -209,6 +235,12 @@ def _nearest(submaps: Sequence[Submap], component: int, younger: set[int]) -> tu
         if other in younger
     )
     return first, second
+
+
+def _nearest_to(number: int, submaps: Sequence[Submap], others: set[int]) -> int:
+    """Return the id of that of `others` which is nearest to submap `number`."""
+    here = _middle(submaps[number])
+    return min(others, key=lambda other: math.dist(here, _middle(submaps[other])))
 
 
 def _middle(submap: Submap) -> tuple[float, float]:
