@@ -1,6 +1,7 @@
 """The joint map: components aligned along accepted alignments, and merged (paper, VI to VIII)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -11,11 +12,21 @@ from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
 from mapweave.free_space import FreeSpaceParameters, from_rings, rings, unite
 from mapweave.map_raster import MapRaster, RasterParameters
-from mapweave.maps import Alignment, JointComponent, JointMap, LineMap
+from mapweave.maps import (
+    Alignment,
+    JointComponent,
+    JointMap,
+    LineMap,
+    RobotMap,
+    component_name,
+)
 from mapweave.merging import MergingParameters, evolve
 from mapweave.polylines import group_polylines
 from mapweave.segment_confidence import SegmentConfidenceParameters, segment_confidence
 from mapweave.simplification import SimplificationParameters, simplify, sources
+from mapweave.weaving import Weaver
+
+Weave: TypeAlias = Callable[[Cluster, Sequence[Alignment]], tuple[Cluster, Mapping[str, LineMap]]]
 
 
 class JointParameters(BaseModel):
@@ -37,11 +48,18 @@ def build_joint_map(
     alignments: Sequence[Alignment],
     version: int,
     parameters: JointParameters | None = None,
+    weave: Weave | None = None,
 ) -> JointMap:
     """Return what the team knows: `components` (by name, such as ``a/0``) joined and merged.
 
     Alignments that contradict others, or what robots saw, are set aside: they stay in the joint
     map as ambiguous, the reason saying so.
+
+    Parameters
+    ----------
+    weave
+        Moves the submaps of a cluster to where they fit, given the alignments as they were judged;
+        without it components stay rigid.
     """
     p = parameters or JointParameters()
     rasters = {
@@ -50,8 +68,42 @@ def build_joint_map(
         if len(lines.segments)
     }
     clusters, judged = cluster_components(sorted(components), alignments, p.graph, rasters)
-    joined = tuple(_join(cluster, components, rasters, p) for cluster in clusters)
+    joined = tuple(
+        _join(cluster, components, rasters, p)
+        if weave is None or len(cluster.poses) == 1
+        else _join_woven(*weave(cluster, judged), p)
+        for cluster in clusters
+    )
     return JointMap(version, joined, judged)
+
+
+def build_team_map(
+    maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int, weaver: Weaver
+) -> JointMap:
+    """Return what the team knows, its robots' submaps woven together."""
+    submaps = {
+        component_name(m.robot, c): [s for s in m.submaps if s.component == c]
+        for m in maps
+        for c in m.components
+    }
+    lines = {name: unite_lines([place(s.map, s.pose) for s in of]) for name, of in submaps.items()}
+    return build_joint_map(
+        lines,
+        alignments,
+        version,
+        weave=lambda cluster, judged: weaver.weave(cluster, submaps, judged),
+    )
+
+
+def _join_woven(
+    cluster: Cluster, components: Mapping[str, LineMap], p: JointParameters
+) -> JointComponent:
+    rasters = {
+        name: MapRaster.of(lines, p.raster)
+        for name, lines in components.items()
+        if len(lines.segments)
+    }
+    return _join(cluster, components, rasters, p)
 
 
 def _join(

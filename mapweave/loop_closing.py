@@ -112,18 +112,18 @@ class LoopCloser:
         if len(newest.map.segments) == 0:
             return []
         paths = self.graph.lengths_from(newest.id, len(submaps))
-        here = _middle(newest)
+        here = middle(newest)
         near = [
             (distance, path, s)
             for s, path in zip(older[:-1], paths, strict=False)
             if s.component == newest.component
             and len(s.map.segments)
-            and (distance := math.dist(_middle(s), here)) < p.reach + _drift(path, p)
+            and (distance := math.dist(middle(s), here)) < p.reach + _drift(path, p)
         ]
         nearest = sorted(near, key=lambda item: item[0])[: p.candidates]
-        return [self._compare(s, newest, path) for _, path, s in nearest]
+        return [self.compare_two(s, newest, path) for _, path, s in nearest]
 
-    def _compare(self, older: Submap, newest: Submap, path: float) -> Comparison:
+    def compare_two(self, older: Submap, newest: Submap, path: float) -> Comparison:
         """Compare two submaps, `path` [m] of tracked path apart; what both saw may prove a link."""
         p = self._parameters
         (reference, target), (other, _) = self._seen(older.map), self._seen(newest.map)
@@ -147,7 +147,7 @@ class LoopCloser:
         return raster, Target.of(raster.surface, self._parameters.icp)
 
 
-def _middle(submap: Submap) -> FloatArray:
+def middle(submap: Submap) -> FloatArray:
     """(2,) middle of a submap's path, component frame [m]."""
     return se2.transform_points(submap.pose, submap.trajectory.pose[:, :2].mean(axis=0))
 

@@ -11,6 +11,7 @@ from mapweave.arrays import FloatArray
 
 IDENTITY: FloatArray = np.zeros(3)
 IDENTITY.setflags(write=False)
+LEVER = 1.0  # [m], how much a heading weighs against a position in a fit
 
 
 def wrap(angle: ArrayLike) -> FloatArray:
@@ -65,3 +66,17 @@ def transform_segments(pose: ArrayLike, segments: ArrayLike) -> FloatArray:
     """Return ``(n, 4)`` `segments` [m], given in the frame at `pose` ``(3,)``, in its parent."""
     s = np.asarray(segments, dtype=float)
     return np.asarray(transform_points(pose, s.reshape(-1, 2)).reshape(s.shape))
+
+
+def fit(poses: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the motion (3,) that takes `poses` (m, 3) closest to `target` (m, 3).
+
+    Least squares over positions and, with the lever, headings: a path on one spot has only those.
+    In the plane the best rotation is the direction of a sum of complex numbers.
+    """
+    p, q = poses[:, 0] + 1j * poses[:, 1], target[:, 0] + 1j * target[:, 1]
+    turned = np.sum(np.conj(p - np.mean(p)) * (q - np.mean(q)))
+    turned += LEVER**2 * np.sum(np.exp(1j * (target[:, 2] - poses[:, 2])))
+    theta = np.angle(turned)
+    shift = np.mean(q) - np.exp(1j * theta) * np.mean(p)
+    return np.array([shift.real, shift.imag, theta])

@@ -60,7 +60,7 @@ class SubmapGraph:
     def track(self, previous: Submap, submap: Submap) -> None:
         """Note that `submap` followed `previous`, both of one component, by tracking."""
         step = se2.between(previous.pose, submap.pose)
-        covariance = _tracking_covariance(previous.trajectory, step, self._parameters)
+        covariance = tracking_covariance(previous.trajectory, step, self._parameters)
         self._trust(Link(previous.id, submap.id, step, covariance, True), submap.trajectory.length)
 
     def part(self, submaps: Collection[int]) -> None:
@@ -74,8 +74,7 @@ class SubmapGraph:
 
     def join(self, older: Submap, younger: Submap) -> None:
         """Note that two components were joined, at the present poses of these two submaps."""
-        p = self._parameters
-        covariance = np.diag(np.array([p.joining_sigma, p.joining_sigma, p.joining_turn]) ** 2)
+        covariance = joining_covariance(self._parameters)
         step = se2.between(older.pose, younger.pose)
         self._trust(Link(older.id, younger.id, step, covariance, True), younger.trajectory.length)
 
@@ -147,7 +146,12 @@ class SubmapGraph:
         return [replace(s, pose=poses[index[s.id]]) if moved[s.id] else s for s in submaps]
 
 
-def _tracking_covariance(path: Trajectory, step: FloatArray, p: GraphParameters) -> FloatArray:
+def joining_covariance(p: GraphParameters) -> FloatArray:
+    """(3, 3) of a step between submaps of components that were joined by their shapes."""
+    return np.diag(np.array([p.joining_sigma, p.joining_sigma, p.joining_turn]) ** 2)
+
+
+def tracking_covariance(path: Trajectory, step: FloatArray, p: GraphParameters) -> FloatArray:
     """(3, 3) of a tracked `step` (3,) to the frame at its end, along the scans of `path`.
 
     In a direction in which the scans were held worse, as along a corridor, it errs more.

@@ -12,8 +12,6 @@ from mapweave.arrays import FloatArray, IntArray
 from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave_deploy.roster import Member
 
-LEVER = 1.0  # [m], how much a heading weighs against a position in a fit
-
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -105,7 +103,7 @@ def _placed(joint: JointMap, robot_map: RobotMap, member: Member) -> Iterator[Pl
         index, path = component_path(robot_map, component)
         _, here, there = np.intersect1d(index, member.truth_index, return_indices=True)
         if name in poses:
-            true = fit(path[here], member.truth_pose[there]) if len(here) else None
+            true = se2.fit(path[here], member.truth_pose[there]) if len(here) else None
             yield Placed(name, member.place, poses[name], true, path[:, :2])
 
 
@@ -129,20 +127,6 @@ def component_path(robot_map: RobotMap, component: int) -> tuple[IntArray, Float
     index = [submap.trajectory.scan_index for submap in submaps]
     poses = [se2.compose(submap.pose, submap.trajectory.pose) for submap in submaps]
     return np.concatenate(index), np.concatenate(poses)
-
-
-def fit(poses: FloatArray, truth: FloatArray) -> FloatArray:
-    """Return the motion (3,) that takes `poses` (m, 3) closest to `truth` (m, 3).
-
-    Least squares over positions and, with the lever, headings: a path on one spot has only those.
-    In the plane the best rotation is the direction of a sum of complex numbers.
-    """
-    p, q = poses[:, 0] + 1j * poses[:, 1], truth[:, 0] + 1j * truth[:, 1]
-    turned = np.sum(np.conj(p - np.mean(p)) * (q - np.mean(q)))
-    turned += LEVER**2 * np.sum(np.exp(1j * (truth[:, 2] - poses[:, 2])))
-    theta = np.angle(turned)
-    shift = np.mean(q) - np.exp(1j * theta) * np.mean(p)
-    return np.array([shift.real, shift.imag, theta])
 
 
 def _compare(reference: Placed, other: Placed, limits: Limits) -> Iterator[Verdict]:

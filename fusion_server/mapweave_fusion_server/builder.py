@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from mapweave.maps import JointMap
+from mapweave.weaving import Weaver
 from mapweave_fusion_server.coordinator import Draft
 from mapweave_protocol.codec import encode
 from mapweave_protocol.messages import JointMapMessage
@@ -46,6 +47,7 @@ class Builder:
 
     def __init__(self, series: str) -> None:
         self._series = series
+        self._weaver = Weaver()  # the worker's alone
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
         self._future: Future[Built] | None = None
 
@@ -90,5 +92,5 @@ class Builder:
         return future.result()
 
     def _build(self, draft: Draft, begun: float) -> Built:
-        joint = draft.build()
+        joint = draft.build(self._weaver)
         return Built(draft, begun, joint, encode(JointMapMessage.pack(joint, self._series)))

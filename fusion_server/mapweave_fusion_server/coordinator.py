@@ -11,11 +11,11 @@ from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.assembly import assemble
 from mapweave.carrying import Change, SubmapPlace, carry, places_of
-from mapweave.joint import build_joint_map
+from mapweave.joint import build_team_map
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name
 from mapweave.revocation import mark_revoked
+from mapweave.weaving import Weaver
 from mapweave_protocol.messages import AlignmentMessage, MapVersion
 
 Run: TypeAlias = tuple[str, str]  # robot and boot
@@ -62,14 +62,15 @@ class Draft:
     alignments: tuple[Alignment, ...]
     before: tuple[Alignment, ...] = ()
 
-    def build(self) -> JointMap:
-        """Return the joint map; what it revokes of the last version, it names."""
-        components = {
-            component_name(robot_map.robot, component): assemble(robot_map, component)
-            for robot_map in self.maps
-            for component in robot_map.components
-        }
-        joint = build_joint_map(components, self.alignments, self.version)
+    def build(self, weaver: Weaver) -> JointMap:
+        """Return the joint map; what it revokes of the last version, it names.
+
+        Parameters
+        ----------
+        weaver
+            Remembers, from one version to the next, which submaps fit.
+        """
+        joint = build_team_map(self.maps, self.alignments, self.version, weaver)
         return mark_revoked(joint, self.before)
 
 

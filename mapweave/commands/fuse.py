@@ -4,16 +4,16 @@ import argparse
 from itertools import combinations
 from pathlib import Path
 
-from mapweave.assembly import assemble
 from mapweave.cli import Command
 from mapweave.confidence import percent
 from mapweave.errors import FileError
 from mapweave.files import check_outputs, read_map, write_joint
 from mapweave.fusion import align_robots
-from mapweave.joint import build_joint_map
-from mapweave.maps import Alignment, JointMap, RobotMap, component_name
+from mapweave.joint import build_team_map
+from mapweave.maps import Alignment, JointMap, RobotMap
 from mapweave.picture import check_picture_suffix, draw_joint
 from mapweave.progress import track
+from mapweave.weaving import Weaver, WeavingParameters
 
 EXIT_NOT_ALL_JOINED = 3
 
@@ -61,8 +61,7 @@ def fuse(maps: list[RobotMap]) -> JointMap:
     alignments = [
         a for first, second in track(pairs, "comparing") for a in align_robots(first, second)
     ]
-    components = {component_name(m.robot, c): assemble(m, c) for m in maps for c in m.components}
-    return build_joint_map(components, alignments, version=1)
+    return build_team_map(maps, alignments, 1, Weaver(WeavingParameters(newest=True)))
 
 
 def tell(joint: JointMap) -> list[str]:

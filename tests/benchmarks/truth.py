@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from mapweave import se2
 from mapweave.arrays import BoolArray, FloatArray, IntArray
 from mapweave.maps import RobotMap
-from mapweave_deploy.verdict import component_path, fit
+from mapweave_deploy.verdict import component_path
 
 STEP_DISTANCE, STEP_TURN = 0.25, np.radians(5.0)  # [m], [rad] within which a step is right
 MEETING, NO_MEETING = 1.0, 3.0  # [m] within which scans meet, and beyond which they do not
@@ -76,7 +76,7 @@ def true_frame(path: Path2D, truth: FloatArray) -> FloatArray:
     known = np.isfinite(truth[path.index, 0])
     if not known.any():
         return np.full(3, np.nan)
-    return fit(path.pose[known], truth[path.index[known]])
+    return se2.fit(path.pose[known], truth[path.index[known]])
 
 
 def position_error(path: Path2D, truth: FloatArray) -> float:

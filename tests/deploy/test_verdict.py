@@ -9,7 +9,7 @@ from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
 from mapweave_deploy.roster import Member
-from mapweave_deploy.verdict import Limits, Verdict, fit, judge, main_component, scan_counts
+from mapweave_deploy.verdict import Limits, Verdict, judge, main_component, scan_counts
 
 LIMITS = Limits(0.3, np.radians(3.0))
 
@@ -50,20 +50,6 @@ def robot_map(robot: str, path: FloatArray, rng: np.random.Generator) -> RobotMa
         trajectory = Trajectory(part, np.zeros(25), se2.between(frame, path[part]))
         submaps.append(Submap(number, 0, frame, LineMap.empty(), trajectory))
     return RobotMap(robot, "boot", 1, tuple(submaps))
-
-
-def test_a_fit_finds_the_motion_between_two_paths() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        motion, poses = rng.normal(0, 2, 3), drive(rng)
-        found = fit(poses, se2.compose(motion, poses))
-        np.testing.assert_allclose(se2.between(motion, found), 0.0, atol=1e-9)
-
-
-def test_a_fit_on_one_spot_uses_the_headings() -> None:
-    poses = np.array([[1.0, 2.0, 0.1]])
-    motion = np.array([3.0, -1.0, 2.0])
-    np.testing.assert_allclose(fit(poses, se2.compose(motion, poses)), motion, atol=1e-9)
 
 
 def test_robots_joined_as_in_truth_are_right_wherever_the_frames_are() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from mapweave import se2
 from mapweave.maps import JointMap, RobotMap
+from mapweave.weaving import Weaver
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters, Draft
 from mapweave_protocol.codec import encode
 from mapweave_protocol.messages import JointMapMessage
@@ -43,7 +44,7 @@ def test_the_furthest_alignment_that_may_arrive_makes_a_version_that_can_be_sent
     for robot_map in maps:
         coordinator.receive_map(robot_map)
     coordinator.receive_alignments(make_alignments(*maps, transform=(WORLD_REACH, 0.0, 0.0)))
-    encode(JointMapMessage.pack(_make_version(coordinator).build(), "s1"))
+    encode(JointMapMessage.pack(_make_version(coordinator).build(Weaver()), "s1"))
 
 
 def test_no_version_is_due_before_anything_was_received() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mapweave import se2
+from mapweave.weaving import Weaver
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import last_version
 from mapweave_fusion_server.store import Store
@@ -73,7 +74,7 @@ class Team:
     def next_version(self) -> JointMap:
         """Return the version that is due, built."""
         assert self.coordinator.seconds_until_due(0.0) == 0.0
-        joint = self.coordinator.begin(0.0).build()
+        joint = self.coordinator.begin(0.0).build(Weaver())
         self.coordinator.finish(joint)
         return joint
 

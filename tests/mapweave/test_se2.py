@@ -79,3 +79,16 @@ def test_segments_are_moved_by_both_ends_and_keep_their_lengths(rng: Generator) 
 def test_the_identity_cannot_be_changed_by_accident() -> None:
     with pytest.raises(ValueError, match="read-only"):
         se2.IDENTITY[0] = 1.0
+
+
+def test_a_fit_finds_the_motion_between_two_paths(rng: Generator) -> None:
+    for _ in range(20):
+        motion, path = random_pose(rng), poses(rng, 5)
+        found = se2.fit(path, se2.compose(motion, path))
+        np.testing.assert_allclose(se2.between(motion, found), 0.0, atol=1e-9)
+
+
+def test_a_fit_on_one_spot_uses_the_headings() -> None:
+    here = np.array([[1.0, 2.0, 0.1]])
+    motion = np.array([3.0, -1.0, 2.0])
+    np.testing.assert_allclose(se2.fit(here, se2.compose(motion, here)), motion, atol=1e-9)

@@ -1,0 +1,188 @@
+"""Weaving: the submaps of robots that were joined move to where all of them fit.
+
+An alignment lays one component on another as a whole, and both are bent by what tracking errs. So
+each submap is looked for in those about it, of whichever robot, as a robot closes its loops; a
+robust pose graph over all robots' submaps takes what is found. The robots' maps that are handed on
+bend by as much; which robots are joined, and how sure that is, was decided before.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave import se2
+from mapweave.alignment_graph import Cluster
+from mapweave.arrays import FloatArray
+from mapweave.assembly import place, unite_lines
+from mapweave.loop_closing import LoopCloser, LoopParameters, middle
+from mapweave.maps import Alignment, LineMap, Submap, Trajectory
+from mapweave.pose_graph import Link, optimise
+from mapweave.submap_graph import joining_covariance, tracking_covariance
+
+
+class WeavingParameters(BaseModel):
+    """Which submaps are compared."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    loops: LoopParameters = LoopParameters(min_drift=0.9, min_turn=0.1, remembered=512)
+    candidates: int = Field(2, ge=1, description="submaps of each component compared, the nearest")
+    reach: float = Field(8.0, gt=0, description="[m] between the middles of submaps compared")
+    step: float = Field(0.25, gt=0, description="[m] places nearer to each other are searched once")
+    turn_step: float = Field(0.03, gt=0, description="[rad] the same for turns")
+    newest: bool = Field(
+        default=False,
+        description="whether the newest submap of each component is compared as well: in a running"
+        " team it grows with every message, and goes along with the one before",
+    )
+    remembered: int = Field(4096, ge=1, description="comparisons")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Node:
+    """A submap of a component, at its pose (3,) in the cluster's frame."""
+
+    component: str
+    submap: Submap
+
+
+class Weaver:
+    """Remembers what it compared: a finished submap never changes."""
+
+    def __init__(self, parameters: WeavingParameters | None = None) -> None:
+        self._p = parameters or WeavingParameters()
+        self._loops = LoopCloser(self._p.loops)
+        self._found = lru_cache(self._p.remembered)(self._find)
+
+    def weave(
+        self,
+        cluster: Cluster,
+        submaps: Mapping[str, Sequence[Submap]],
+        alignments: Sequence[Alignment],
+    ) -> tuple[Cluster, dict[str, LineMap]]:
+        """Return `cluster` with the poses that fit best, and each component's lines, bent to fit.
+
+        Parameters
+        ----------
+        submaps
+            Of each component of the cluster, by its name.
+        alignments
+            Those that are relied on.
+        """
+        nodes = [
+            _Node(name, replace(s, pose=se2.compose(pose, s.pose)))
+            for name, pose in cluster.poses.items()
+            for s in submaps[name]
+        ]
+        closures = list(self._closures(nodes))
+        if not closures:
+            return cluster, {name: _lines(submaps[name]) for name in cluster.poses}
+        links = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments), *closures]
+        fitted, _ = optimise(np.array([n.submap.pose for n in nodes]), links)
+        return _rooted(cluster, nodes, fitted)
+
+    def _tracked(self, nodes: Sequence[_Node]) -> Iterator[Link]:
+        """Yield how each submap of a component lies to the one before."""
+        for k, (one, other) in enumerate(pairwise(nodes)):
+            if one.component == other.component:
+                step = se2.between(one.submap.pose, other.submap.pose)
+                path = one.submap.trajectory
+                covariance = tracking_covariance(path, step, self._p.loops.graph)
+                yield Link(k, k + 1, step, covariance, True)
+
+    def _aligned(
+        self, nodes: Sequence[_Node], cluster: Cluster, alignments: Sequence[Alignment]
+    ) -> Iterator[Link]:
+        """Yield how alignments lay those submaps to each other that they bring nearest."""
+        for a in alignments:
+            ours, theirs = (_of(nodes, name) for name in (a.reference, a.other))
+            if a.decision != "accepted" or not (ours and theirs):
+                continue
+            i, j = min(((i, j) for i in ours for j in theirs), key=lambda p: _apart(nodes, *p))
+            frames = cluster.poses[a.reference], cluster.poses[a.other]
+            first, second = (
+                se2.between(frame, nodes[k].submap.pose)
+                for frame, k in zip(frames, (i, j), strict=True)
+            )
+            step = se2.between(first, se2.compose(a.transform, second))
+            yield Link(i, j, step, joining_covariance(self._p.loops.graph), True)
+
+    def _closures(self, nodes: Sequence[_Node]) -> Iterator[Link]:
+        """Yield how submaps lie to each other that saw the same walls."""
+        steps = np.array([self._p.step, self._p.step, self._p.turn_step])
+        for first, second in self._candidates(nodes):
+            older, newer = nodes[first].submap, nodes[second].submap
+            believed = np.round(se2.between(older.pose, newer.pose) / steps)
+            link = self._found(older.map, newer.map, *(int(v) for v in believed))
+            if link is not None:
+                yield replace(link, first=first, second=second)
+
+    def _candidates(self, nodes: Sequence[_Node]) -> Iterator[tuple[int, int]]:
+        """Yield pairs of nodes near each other that tracking does not link."""
+        p = self._p
+        compared = [k for k in self._finished(nodes) if len(nodes[k].submap.map.segments)]
+        for k in compared:
+            near: dict[str, list[tuple[float, int]]] = {}
+            for j in (j for j in compared if j < k):
+                if k - j > 1 or nodes[j].component != nodes[k].component:
+                    near.setdefault(nodes[j].component, []).append((_apart(nodes, j, k), j))
+            for those in near.values():
+                nearest = sorted(those)[: p.candidates]
+                yield from ((j, k) for distance, j in nearest if distance < p.reach)
+
+    def _finished(self, nodes: Sequence[_Node]) -> list[int]:
+        """Return the nodes without the newest of each component, unless that is its only one."""
+        following = [n.component for n in nodes[1:]] + [None]
+        before = [None] + [n.component for n in nodes[:-1]]
+        return [
+            k
+            for k, node in enumerate(nodes)
+            if self._p.newest or node.component == following[k] or node.component != before[k]
+        ]
+
+    def _find(self, older: LineMap, newer: LineMap, x: int, y: int, turn: int) -> Link | None:
+        """Look for `newer` in `older` about the step (x, y, turn), in units of the parameters."""
+        p = self._p
+        believed = np.array([x * p.step, y * p.step, turn * p.turn_step])
+        path = Trajectory.empty()
+        first = Submap(0, 0, se2.IDENTITY, older, path)
+        return self._loops.compare_two(first, Submap(1, 0, believed, newer, path), 0.0).link
+
+
+def _of(nodes: Sequence[_Node], component: str) -> list[int]:
+    return [k for k, node in enumerate(nodes) if node.component == component]
+
+
+def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
+    """[m] between the middles of two submaps."""
+    return math.dist(middle(nodes[first].submap), middle(nodes[second].submap))
+
+
+def _lines(submaps: Sequence[Submap]) -> LineMap:
+    return unite_lines([place(s.map, s.pose) for s in submaps])
+
+
+def _rooted(
+    cluster: Cluster, nodes: Sequence[_Node], fitted: FloatArray
+) -> tuple[Cluster, dict[str, LineMap]]:
+    """Return where components are as wholes, the first at the origin, and their lines at `fitted`.
+
+    (n, 3) of the nodes.
+    """
+    poses, lines = {}, {}
+    for name, frame in cluster.poses.items():
+        inside = _of(nodes, name)
+        before = np.array([se2.between(frame, nodes[k].submap.pose) for k in inside])
+        poses[name] = se2.fit(before, fitted[inside])
+        own = se2.between(poses[name], fitted[inside])
+        maps = [nodes[k].submap.map for k in inside]
+        lines[name] = unite_lines([place(m, pose) for m, pose in zip(maps, own, strict=True)])
+    first, root = next(iter(poses.items()))
+    rooted = {name: se2.between(root, pose) for name, pose in poses.items()}
+    rooted[first] = np.zeros(3)
+    return replace(cluster, poses=rooted), lines
