@@ -99,10 +99,12 @@ class _Run:
         """Keep what is newer in `message` than what is held."""
         digests = {place.id: place.digest for place in message.places}
         for packed in message.submaps:
-            held = self.held.get(packed.id)
-            if held is None or held.version <= message.version:
+            held, digest = self.held.get(packed.id), digests[packed.id]
+            if held is not None and held.digest == digest:
+                held.version = max(held.version, message.version)  # and the same object still
+            elif held is None or held.version <= message.version:
                 submap = packed.unpack(0, np.zeros(3))
-                self.held[packed.id] = _Held(message.version, digests[packed.id], submap)
+                self.held[packed.id] = _Held(message.version, digest, submap)
         if self.newest is None or self.newest.version < message.version:
             self.newest = message
 

@@ -189,6 +189,17 @@ def test_unchanged_submaps_keep_their_objects(random_map: MakeMap) -> None:
     assert kept > 0
 
 
+def test_a_complete_message_that_says_nothing_new_keeps_the_objects(random_map: MakeMap) -> None:
+    """What was computed from a submap need not be computed again."""
+    robot_map = random_map(3, 4)
+    assembler = MapAssembler()
+    first = assembler.update(decode(MapMessage, MapSender().payload(robot_map)))
+    later = replace(robot_map, version=robot_map.version + 1)
+    again = assembler.update(decode(MapMessage, MapSender().payload(later)))
+    assert first is not None and again is not None and again.version == later.version
+    assert [s.map for s in again.submaps] == [s.map for s in first.submaps]
+
+
 @pytest.mark.parametrize("submaps", [0, 1])
 def test_a_map_of_next_to_nothing_travels_too(random_map: MakeMap, submaps: int) -> None:
     robot_map = random_map(1, submaps)
