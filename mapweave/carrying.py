@@ -2,7 +2,8 @@
 
 An alignment says how two components lie to each other; what was compared are walls in their
 submaps. When a robot corrects its map, by a loop that it closes, the submaps move within the
-component. What they have in common moves with them, so the alignment is kept there.
+component. What they have in common moves with them, so the alignment is kept there. When a robot
+finds that a submap is elsewhere, what was aligned by way of it is open again.
 """
 
 from collections.abc import Mapping
@@ -43,16 +44,19 @@ def places_of(robot_map: RobotMap) -> dict[int, SubmapPlace]:
 def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
     """Return `alignment`, found between the maps as they were then, for the maps as they are now.
 
-    It holds on to the two submaps that it brings nearest to each other.
+    It holds on to the two submaps that it brings nearest to each other; where one of these has left
+    its component, what was accepted is ambiguous until the maps are compared again.
     """
-    ours = _kept(reference, alignment.reference)
-    theirs = _kept(other, alignment.other)
+    ours = _then(reference, alignment.reference)
+    theirs = _then(other, alignment.other)
     if not ours or not theirs:
         return alignment
     here = np.array([_middle(s, reference) for s in ours])
     there = se2.transform_points(alignment.transform, np.array([_middle(s, other) for s in theirs]))
     apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
     i, j = np.unravel_index(np.argmin(apart), apart.shape)
+    if _has_left(ours[i], reference) or _has_left(theirs[j], other):
+        return _opened(alignment)
     first, second = _motion(ours[i], reference), _motion(theirs[j], other)
     if not (first.any() or second.any()):
         return alignment
@@ -60,17 +64,27 @@ def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
     return replace(alignment, transform=moved)
 
 
-def _kept(change: Change, component: str) -> list[Submap]:
-    """Return the submaps that are in this component now and were then."""
+def _opened(alignment: Alignment) -> Alignment:
+    if alignment.decision != "accepted":
+        return alignment
+    reason = "what was compared is in another component by now; to be compared again"
+    return replace(alignment, decision="ambiguous", reason=reason)
+
+
+def _then(change: Change, component: str) -> list[Submap]:
+    """Return the submaps, as they are now, that were in this component then."""
     number = int(component.rsplit("/", 1)[1])
     return [
         s
         for s in change.now.submaps
-        if s.component == number
-        and s.id in change.then
+        if s.id in change.then
         and change.then[s.id].component == number
         and change.then[s.id].first == _first(s)
     ]
+
+
+def _has_left(submap: Submap, change: Change) -> bool:
+    return submap.component != change.then[submap.id].component
 
 
 def _first(submap: Submap) -> int | None:

@@ -96,7 +96,9 @@ class Departures:
             self.forget()
         older = [(c.older.id, c.raster) for c in compared]
         self._recent.append(_Asked(submaps[-1].id, list(surfaces), older))
-        if not (follows and departs([c.verdict for c in compared], self._p)):
+        # Those of which it is asked whether they departed do not testify for each other.
+        verdicts = [c.verdict for c in compared if c.older.id < self._recent[0].id]
+        if not (follows and departs(verdicts, self._p)):
             return None
         return self._first(submaps)
 
@@ -106,7 +108,7 @@ class Departures:
 
     def _first(self, submaps: Sequence[Submap]) -> Departure | None:
         """Return the scan that departs, if any; of an earlier submap than the newest, its first."""
-        shares = [self._refuted(asked, submaps) for asked in self._recent]
+        shares = [self._shares(asked, submaps) for asked in self._recent]
         starts = np.cumsum([0, *map(len, shares[:-1])])
         newest = starts[-1] + np.arange(1, len(shares[-1]) + 1)
         doubt = doubts(np.concatenate(shares), self._p)
@@ -116,10 +118,14 @@ class Departures:
         k = int(np.searchsorted(starts, at, side="right")) - 1
         return Departure(self._recent[k].id, at - int(starts[k]))
 
-    def _refuted(self, asked: _Asked, submaps: Sequence[Submap]) -> FloatArray:
-        """(n,) share of the returns of each scan that the older submaps refute."""
-        submap = submaps[asked.id]
-        older = [(raster, se2.between(submaps[k].pose, submap.pose)) for k, raster in asked.older]
+    def _shares(self, asked: _Asked, submaps: Sequence[Submap]) -> FloatArray:
+        """(n,) share of the returns of each scan refuted by submaps older than all asked."""
+        submap, first = submaps[asked.id], self._recent[0].id
+        older = [
+            (raster, se2.between(submaps[k].pose, submap.pose))
+            for k, raster in asked.older
+            if k < first
+        ]
         return refuted(asked.surfaces, submap.trajectory.pose, older, self._p)
 
 
@@ -159,11 +165,13 @@ def refuted(
     older
         What was mapped before, each with the (3,) pose of that frame in its own.
     """
-    shares = [_refuted(s, pose, older, parameters) for s, pose in zip(surfaces, poses, strict=True)]
+    shares = [
+        _refuted_share(s, pose, older, parameters) for s, pose in zip(surfaces, poses, strict=True)
+    ]
     return np.array(shares)
 
 
-def _refuted(
+def _refuted_share(
     surface: Surface,
     pose: FloatArray,
     older: Sequence[tuple[MapRaster, FloatArray]],

@@ -1,6 +1,6 @@
 """Recognition: a robot comes to where another of its components is, though both may be bent.
 
-As wholes, two long components may share no one transform. What was mapped over the last tens of
+As wholes, two long components may share no one transform. What was tracked over the last tens of
 metres is rigid; where it is found in another component twice in a row, at the same place, the robot
 is there.
 """
@@ -14,8 +14,10 @@ from mapweave.arrays import FloatArray
 from mapweave.assembly import place, unite_lines
 from mapweave.fusion import FusionParameters, compare, prepare
 from mapweave.hypotheses import Shape
-from mapweave.maps import Submap
+from mapweave.map_raster import MapRaster
+from mapweave.maps import LineMap, Submap
 from mapweave.parts import PartParameters, difference
+from mapweave.verification import verify
 
 
 class RecognitionParameters(BaseModel):
@@ -44,14 +46,24 @@ class Recognised:
 
 
 class Recognition:
-    """Remembers where the part before was found."""
+    """Tells where the newest part is, once the part before was found there as well.
+
+    Where it is found in two components nothing is said: one of them may be a look-alike.
+    """
 
     def __init__(self, parameters: RecognitionParameters, fusion: FusionParameters) -> None:
         self._p, self._fusion = parameters, fusion
-        self._before: dict[int, Recognised] = {}
+        self._before: dict[tuple[int, int], Recognised] = {}
+
+    def forget(self) -> None:
+        """Begin anew, as when components were joined: frames have changed."""
+        self._before = {}
 
     def look(
-        self, submaps: Sequence[Submap], shape_of: Callable[[int], Shape | None]
+        self,
+        submaps: Sequence[Submap],
+        tracked: Sequence[Submap],
+        shape_of: Callable[[int], Shape | None],
     ) -> Recognised | None:
         """Look for the newest part of `submaps` in the other components.
 
@@ -59,35 +71,51 @@ class Recognition:
 
         Parameters
         ----------
+        tracked
+            The last submaps that were tracked from one another.
         shape_of
             Prepares a component, by its number.
         """
-        here = submaps[-1].component
-        part = [s for s in submaps[-self._p.submaps :] if s.component == here]
-        others = [
-            c for c in sorted({s.component for s in submaps} - {here}) if self._is_long(submaps, c)
-        ]
-        if len(part) < self._p.submaps or not self._is_long(submaps, here) or not others:
-            self._before = {}
+        before, self._before = self._before, {}
+        part = tracked[-self._p.submaps :]
+        here = submaps[-1].component if submaps else 0
+        others = sorted({s.component for s in submaps} - {here})
+        long = [c for c in others if self._is_long(submaps, c)]
+        if len(part) < self._p.submaps or not long or not self._is_long(submaps, here):
             return None
-        newest = prepare(unite_lines([place(s.map, s.pose) for s in part]), self._fusion)
-        found = {}
-        for component in others:
-            alignment = compare("other", shape_of(component), "newest", newest, self._fusion)
-            if alignment.decision == "accepted":
-                found[component] = Recognised(component, alignment.transform)
-        again = [one for one in found.values() if newest and self._confirms(one, newest)]
-        self._before = found
+        newest = prepare(_lines(part), self._fusion)
+        for component in long:
+            transform = self._found(part, newest, shape_of(component))
+            if transform is not None:
+                self._before[here, component] = Recognised(component, transform)
+        again = [
+            found
+            for pair, found in self._before.items()
+            if newest and pair in before and self._agree(before[pair], found, newest)
+        ]
         return again[0] if len(again) == 1 else None
 
     def _is_long(self, submaps: Sequence[Submap], component: int) -> bool:
         return sum(s.component == component for s in submaps) > self._p.submaps
 
-    def _confirms(self, found: Recognised, newest: Shape) -> bool:
+    def _found(
+        self, part: Sequence[Submap], newest: Shape | None, other: Shape | None
+    ) -> FloatArray | None:
+        """(3,) transform by which `part` is found in `other`, its last submap as well."""
+        alignment = compare("other", other, "newest", newest, self._fusion)
+        if alignment.decision != "accepted" or other is None:
+            return None
+        last = MapRaster.of(_lines(part[-1:]), self._fusion.raster)
+        verdict = verify(other.raster, last, alignment.transform, self._fusion.verification)
+        return alignment.transform if verdict.common >= self._fusion.min_common else None
+
+    def _agree(self, before: Recognised, found: Recognised, newest: Shape) -> bool:
         """Whether the part before was found at the same place."""
-        before, p = self._before.get(found.component), self._p.agreement
-        if before is None:
-            return False
         middle = newest.raster.surface.points.mean(axis=0)
         apart, turned = difference(before.transform, found.transform, middle)
-        return apart <= p.distance and turned <= p.turn
+        return apart <= self._p.agreement.distance and turned <= self._p.agreement.turn
+
+
+def _lines(submaps: Sequence[Submap]) -> LineMap:
+    """Return the lines of `submaps`, not merged, in their component's frame."""
+    return unite_lines([place(s.map, s.pose) for s in submaps])

@@ -8,7 +8,7 @@ for where the robot was when it lost track of the one before; what both saw deci
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -41,7 +41,10 @@ class ReunionParameters(BaseModel):
     )
     reach: float = Field(3.0, gt=0, description="[m] that a robot came while it was lost, at most")
     max_reach: float = Field(
-        6.0, gt=0, description="[m] the same with components in between, their paths included"
+        7.5, gt=0, description="[m] the same with a piece in between, its path included"
+    )
+    gaps: int = Field(
+        2, ge=1, description="between two components where it is looked for, the last"
     )
     step: float = Field(0.3, gt=0, description="[m] between the places tried there")
     turn_step: float = Field(0.06, gt=0, description="[rad] between the headings tried there")
@@ -60,13 +63,17 @@ class Reunion:
         self._shapes: dict[int, tuple[object, Shape | None]] = {}
         self._recognition = Recognition(self._p.recognition, self._p.fusion)
 
-    def reunite(self, submaps: Sequence[Submap]) -> tuple[list[Submap], list[tuple[int, int]]]:
-        """Join every component to an older one where the shapes prove it.
+    def reunite(
+        self, submaps: Sequence[Submap], tracked: int = 1
+    ) -> tuple[list[Submap], list[tuple[int, int]]]:
+        """Join components where the shapes prove it: the younger one becomes a part of the older.
 
         Parameters
         ----------
         submaps
             In the order in which they were seen.
+        tracked
+            How many of the last ones were tracked from one another.
 
         Returns
         -------
@@ -87,16 +94,21 @@ class Reunion:
                     joints.append(_nearest(after, older, of_younger))
                     joined = after
                     break
-        return (joined, joints) if joints else self._recognised(joined)
+        if not joints:
+            joined, joints = self._recognised(joined, tracked)
+        if joints:
+            self._recognition.forget()
+        return joined, joints
 
-    def _recognised(self, submaps: list[Submap]) -> tuple[list[Submap], list[tuple[int, int]]]:
-        """Join the component of the newest submap to another one where it is found in it."""
-        if not submaps:
-            return submaps, []
-        newest = submaps[-1]
-        found = self._recognition.look(submaps, lambda component: self._shape(submaps, component))
+    def _recognised(
+        self, submaps: list[Submap], tracked: int
+    ) -> tuple[list[Submap], list[tuple[int, int]]]:
+        """Join the component of the newest submap with another one where it is found in it."""
+        part = submaps[-tracked:]
+        found = self._recognition.look(submaps, part, lambda c: self._shape(submaps, c))
         if found is None:
             return submaps, []
+        newest = submaps[-1]
         here, there = newest.component, found.component
         if here < there:
             joined = self._moved(submaps, here, there, se2.inverse(found.transform))
@@ -155,11 +167,12 @@ class Reunion:
         return shape
 
     def _is_due(self, pair: tuple[int, int], walls: tuple[float, float]) -> bool:
-        """Whether either of a pair has notably more wall [m] than when it was compared."""
+        """Whether either of a pair has notably more wall [m] than when it was compared, or less."""
         before = self._compared.get(pair)
         if before is None:
             return True
-        return any(w > (1 + self._p.growth) * b for w, b in zip(walls, before, strict=True))
+        grown = 1 + self._p.growth
+        return any(not b / grown <= w <= grown * b for w, b in zip(walls, before, strict=True))
 
 
 def _covering(inside: Sequence[Submap], p: ReunionParameters) -> list[Submap]:
@@ -180,18 +193,17 @@ def _between_them(
 ) -> FloatArray:
     """(n, 3) transforms from `younger` to `older` by which the robot did not leap between them.
 
-    Wherever one ended and the other is the next of the two; what it saw meanwhile may be in pieces
-    too small to be joined.
+    Wherever one ended and the other is the next of the two, the last times; what it saw meanwhile
+    may be in a piece too small to be joined.
     """
     seen = [
         (k, s)
         for k, s in enumerate(submaps)
         if s.component in (older, younger) and len(s.trajectory.pose)
     ]
+    gaps = [(a, b) for a, b in pairwise(seen) if a[1].component != b[1].component]
     found = [np.empty((0, 3))]
-    for (k, before), (m, after) in pairwise(seen):
-        if before.component == after.component:
-            continue
+    for (k, before), (m, after) in gaps[-p.gaps :]:
         moves = _moves(_lost_for(submaps[k + 1 : m], p), p)
         last, first = _pose(before, -1), _pose(after, 0)
         if before.component == older:
@@ -203,8 +215,8 @@ def _between_them(
 
 def _lost_for(pieces: Sequence[Submap], p: ReunionParameters) -> float:
     """[m] that a robot may have come while it was lost, these pieces of its path included."""
-    components = len({s.component for s in pieces})
-    return p.reach * (1 + components) + sum(s.trajectory.length for s in pieces)
+    count = len(list(groupby(pieces, lambda s: s.component)))
+    return p.reach * (1 + count) + sum(s.trajectory.length for s in pieces)
 
 
 def _moves(reach: float, p: ReunionParameters) -> FloatArray:

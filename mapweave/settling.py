@@ -115,6 +115,7 @@ class Settler:
         self._reunion = Reunion(parameters.reunion)
         self._loops = LoopCloser(parameters.loops)
         self._departures = Departures(parameters.departure)
+        self._tracked = 0  # how many of the last submaps were tracked from one another
         self._settled: Settled | None = None
 
     def begin(self, finished: Finished) -> None:
@@ -131,6 +132,7 @@ class Settler:
         submaps = [*self._submaps, finished.submap]
         if finished.follows and count:
             self._loops.graph.track(submaps[-2], submaps[-1])
+        self._tracked = self._tracked + 1 if finished.follows else 1
         compared = self._loops.compare(submaps)
         surfaces = [seen.surface for seen in finished.scans]
         at = self._departures.find(submaps, surfaces, compared, finished.follows and count > 0)
@@ -138,7 +140,8 @@ class Settler:
         if at is not None:
             parts = _cut(finished, at, self._parameters.submap)
             submaps = self._departed(submaps, at, [part for part, _ in parts])
-        submaps, joints = self._reunion.reunite(submaps)
+            self._tracked = submaps[-1].id - at.submap + 1 if len(parts) == 1 else 1
+        submaps, joints = self._reunion.reunite(submaps, self._tracked)
         for older, younger in joints:
             self._loops.graph.join(submaps[older], submaps[younger])
         if joints or at is not None:
@@ -157,13 +160,13 @@ class Settler:
         self, submaps: Sequence[Submap], at: Departure, parts: Sequence[Submap]
     ) -> list[Submap]:
         """Return `submaps`, the last in `parts`: none of those from `at` on is tracked to there."""
-        *older, newest = submaps
+        *older, _ = submaps
         if len(parts) == 2:
             return [*self._loops.close([*older, parts[0]]), parts[1]]
-        self._loops.graph.part(range(at.submap, newest.id + 1))
+        kept = self._loops.graph.part(submaps, at.submap)
         component = parts[0].component
         gone = [replace(s, component=component) for s in older[at.submap :]]
-        return [*older[: at.submap], *gone, *parts]
+        return [*kept, *gone, *parts]
 
     def _refined(
         self, submaps: Sequence[Submap], newest: Submap, scans: Sequence[Observation]

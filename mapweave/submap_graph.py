@@ -4,7 +4,7 @@ However many submaps there are, a closure moves those around it: what is many li
 unless the loop that was closed is a long one.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -63,14 +63,26 @@ class SubmapGraph:
         covariance = tracking_covariance(previous.trajectory, step, self._parameters)
         self._trust(Link(previous.id, submap.id, step, covariance, True), submap.trajectory.length)
 
-    def part(self, submaps: Collection[int]) -> None:
-        """Forget all links between `submaps`, by their ids, and the others: they are elsewhere."""
-        kept = [
-            k for k, e in enumerate(self._links) if (e.first in submaps) == (e.second in submaps)
-        ]
+    def part(self, submaps: Sequence[Submap], first: int) -> list[Submap]:
+        """Forget all links between those of `submaps` before number `first` and the others.
+
+        These are elsewhere. Returns those before, at the poses that fit what is left: closures of
+        the others may have moved them.
+        """
+        crossing = [(e.first < first) != (e.second < first) for e in self._links]
+        closed = any(
+            c and relied and not e.trusted
+            for c, relied, e in zip(crossing, self._relied, self._links, strict=True)
+        )
+        kept = [k for k, c in enumerate(crossing) if not c]
         self._links = [self._links[k] for k in kept]
         self._relied = [self._relied[k] for k in kept]
         self._lengths = [self._lengths[k] for k in kept]
+        left = list(submaps[:first])
+        moved = np.array([s.component == submaps[-1].component for s in left])
+        if not closed or moved.sum() < 2:
+            return left
+        return self._fitted(left, np.append(moved, np.zeros(len(submaps) - first, dtype=np.bool_)))
 
     def join(self, older: Submap, younger: Submap) -> None:
         """Note that two components were joined, at the present poses of these two submaps."""

@@ -17,6 +17,7 @@ from mapweave.maps import LineMap
 from mapweave.tangent_space import complexities
 
 DIRECTIONS = 64  # that coarse scores tell apart: 5.6° each
+AT_ONCE = 20_000  # transforms scored: their samples take some 10 MB an array
 NOTHING, SEEN_THROUGH = DIRECTIONS, DIRECTIONS + 1  # what a cell without a wall says
 
 
@@ -94,9 +95,13 @@ def coarse_scores(
     parameters: VerificationParameters,
 ) -> FloatArray:
     """Return (k,) metres in common less contradicted for (k, 3) `transforms`, from few samples."""
-    forward = _coarse_one_way(reference, other, transforms, max_samples, parameters)
-    backward = _coarse_one_way(other, reference, se2.inverse(transforms), max_samples, parameters)
-    return np.asarray(forward + backward) / 2
+    scores = np.empty(len(transforms))
+    for start in range(0, len(transforms), AT_ONCE):
+        some = transforms[start : start + AT_ONCE]
+        forward = _coarse_one_way(reference, other, some, max_samples, parameters)
+        backward = _coarse_one_way(other, reference, se2.inverse(some), max_samples, parameters)
+        scores[start : start + AT_ONCE] = (forward + backward) / 2
+    return scores
 
 
 def _coarse_one_way(

@@ -89,6 +89,19 @@ def test_submaps_that_changed_component_since_carry_nothing() -> None:
     assert carry(found, still(A), Change(places_of(elsewhere), corrected(B, 1))) is found
 
 
+def test_what_was_found_on_a_submap_that_left_its_component_is_open_again() -> None:
+    """The robot jumped there without notice: that place is another one."""
+    gone = replace(B, submaps=(B.submaps[0], replace(B.submaps[1], component=1)))
+    carried = carry(alignment(FOUND), still(A), Change(places_of(B), gone))
+    assert carried.decision == "ambiguous"
+    assert "another component" in carried.reason
+    refused = replace(alignment(FOUND), decision="refused")
+    assert carry(refused, still(A), Change(places_of(B), gone)) is refused
+    here = se2.compose(A.submaps[0].pose, se2.inverse(B.submaps[0].pose))
+    elsewhere = alignment(here)
+    assert carry(elsewhere, still(A), Change(places_of(B), gone)) is elsewhere
+
+
 def test_submaps_without_walls_break_nothing() -> None:
     empty = robot("b", np.zeros(3), lines=LineMap.empty())
     moved = carry(alignment(FOUND), still(A), Change(places_of(empty), corrected(empty, 0)))

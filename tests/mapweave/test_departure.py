@@ -1,5 +1,7 @@
 """What a robot maps after a jump that it did not notice contradicts what it mapped before."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from numpy.random import Generator
@@ -17,9 +19,11 @@ from mapweave.departure import (
 from mapweave.loop_closing import Comparison
 from mapweave.map_raster import MapRaster, RasterParameters
 from mapweave.mapper import Mapper
-from mapweave.maps import LineMap, Submap, Trajectory
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave.observation import ObservationParameters, observe
+from mapweave.reunion import Reunion
 from mapweave.scan import Scan
+from mapweave.surface import Surface
 from mapweave.verification import Verdict
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, cast, corridor, part, walls_of
 
@@ -155,3 +159,50 @@ def test_a_jump_into_a_look_alike_is_found_out_and_undone(rng: Generator) -> Non
     component, last = where[len(poses) - 1]
     assert component == 0
     np.testing.assert_allclose(last[:2], true[:2], atol=0.5)
+
+
+def forced_to_depart(monkeypatch: pytest.MonkeyPatch, newest: int, first: int) -> None:
+    """Have it said, once submap `newest` is finished, that the robot departed at `first`."""
+    find = Departures.find
+
+    def said(
+        self: Departures,
+        submaps: Sequence[Submap],
+        surfaces: Sequence[Surface],
+        compared: Sequence[Comparison],
+        follows: bool,
+    ) -> Departure | None:
+        find(self, submaps, surfaces, compared, follows)
+        return Departure(first, 0) if submaps[-1].id == newest else None
+
+    monkeypatch.setattr(Departures, "find", said)
+
+
+def driven(rng: Generator) -> tuple[FloatArray, RobotMap]:
+    """Return the true poses of a drive through the twin corridor, and its map."""
+    poses = np.array([[x, 1.1, 0.0] for x in np.arange(1, 62, 0.5)])
+    mapper = Mapper("a")
+    for k, pose in enumerate(poses):
+        mapper.add(cast(walls_of(TWINS), pose, index=k, noise=rng, max_range=7.0))
+    return poses, mapper.finish()
+
+
+def test_submaps_that_depart_together_leave_together(
+    rng: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And what is tracked from them goes on with them."""
+    monkeypatch.setattr(Reunion, "reunite", lambda _, submaps, __: (submaps, []))
+    forced_to_depart(monkeypatch, newest=3, first=2)
+    poses, robot_map = driven(rng)
+    components = [s.component for s in robot_map.submaps]
+    assert components == [0, 0] + [1] * (len(components) - 2)
+    assert [s.id for s in robot_map.submaps] == list(range(len(components)))
+    for component, start in ((0, 0), (1, 2)):
+        first = robot_map.submaps[start]
+        last = [s for s in robot_map.submaps if s.component == component][-1]
+        apart = se2.between(
+            se2.compose(first.pose, first.trajectory.pose[0]),
+            se2.compose(last.pose, last.trajectory.pose[-1]),
+        )
+        ends = first.trajectory.scan_index[0], last.trajectory.scan_index[-1]
+        np.testing.assert_allclose(apart, se2.between(*poses[list(ends)]), atol=0.25)

@@ -45,7 +45,8 @@ def look(recognition: Recognition, submaps: list[Submap]) -> Recognised | None:
     def shape_of(number: int) -> Shape | None:
         return prepare(lines_of(submaps, number), F)
 
-    return recognition.look(submaps, shape_of)
+    newest = [s for s in submaps if s.component == submaps[-1].component]
+    return recognition.look(submaps, newest, shape_of)
 
 
 def test_these_components_cannot_be_joined_as_wholes() -> None:
@@ -92,7 +93,7 @@ def test_the_robot_that_is_recognised_joins_the_older_component(first: int) -> N
     ids = iter(range(10))
     submaps = [replace(s, id=next(ids)) for s in [*there, *here]]
     reunion = Reunion(ReunionParameters(recognition=P, growth=1e6))
-    results = [reunion.reunite(submaps[: 5 + count]) for count in (4, 5)]
+    results = [reunion.reunite(submaps[: 5 + count], tracked=count) for count in (4, 5)]
     assert [len(joints) for _, joints in results] == [0, 1]
     joined, [joint] = results[-1]
     assert {s.component for s in joined} == {0}

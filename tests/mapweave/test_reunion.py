@@ -9,7 +9,7 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place
-from mapweave.maps import LineMap, Submap, Trajectory
+from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.reunion import Reunion, ReunionParameters, _covering
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, corridor, part, random_pose, shaken
 
@@ -90,9 +90,32 @@ def test_a_pair_that_was_refused_is_not_compared_again_before_it_has_grown(
     )
     reunion = Reunion()
     assert reunion.reunite([first, other])[1] == []
-    alike = submap(1, 1, other.pose, part(BUILDING, 4, 12))
+    alike = submap(1, 1, other.pose, part(BUILDING, 0, 26))
     assert Reunion().reunite([first, alike])[1] == [(0, 1)]
     assert reunion.reunite([first, alike])[1] == []
+
+
+def test_a_pair_that_was_refused_is_compared_again_when_a_part_of_one_has_left_it(
+    parts: list[LineMap], rng: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a submap that was tracked to a wrong place, and contradicted the other component there."""
+    compared: list[str] = []
+
+    def refuse(*names: object) -> Alignment:
+        compared.append(str(names[0]))
+        return Alignment("older", "younger", np.zeros(3), "refused", 0.0, "so")
+
+    monkeypatch.setattr("mapweave.reunion.compare", refuse)
+    good, wrong = submap(0, 0, np.zeros(3), parts[0]), submap(1, 0, np.zeros(3), parts[1])
+    other = submap(2, 1, random_pose(rng), part(OTHER_BUILDING, 0, 26))
+    reunion = Reunion()
+    for submaps, count in (
+        ([good, wrong, other], 1),
+        ([good, wrong, other], 1),
+        ([good, replace(wrong, component=1), other], 2),
+    ):
+        reunion.reunite(submaps)
+        assert len(compared) == count
 
 
 def broken(parts: list[LineMap], gap: FloatArray) -> list[Submap]:
@@ -149,8 +172,7 @@ def test_what_was_seen_in_between_in_pieces_does_not_hide_where_track_was_lost(
     piece = Submap(1, 1, np.zeros(3), LineMap.empty(), trajectory(path))
     after = replace(after, id=2, component=2)
     assert by_shape_alone().reunite([before, piece, after])[1] == []
-    parameters = ReunionParameters(max_reach=7.0)
-    assert Reunion(parameters).reunite([before, piece, after])[1] == joint
+    assert Reunion().reunite([before, piece, after])[1] == joint
 
 
 def test_a_robot_that_was_carried_away_is_not_believed_to_be_where_it_was(rng: Generator) -> None:

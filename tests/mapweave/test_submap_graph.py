@@ -56,7 +56,8 @@ def test_submaps_that_are_elsewhere_hang_on_each_other_alone() -> None:
     poses = circle(6, 100)
     graph, submaps = chain(poses, GraphParameters())
     graph.close(submaps, [closure(0, 5, poses)])
-    graph.part({4, 5})
+    left = graph.part(submaps, 4)
+    assert [s.id for s in left] == [0, 1, 2, 3]
     assert [graph.neighbours(k) for k in (0, 3, 4, 5)] == [[1], [2], [5], [4]]
     np.testing.assert_array_equal(graph.lengths_from(3, 6)[4:], np.inf)
 
