@@ -16,8 +16,9 @@ from mapweave.confidence import percent
 from mapweave.cuts import weakest_cut
 from mapweave.cycles import Edge
 from mapweave.map_raster import MapRaster, RasterParameters
-from mapweave.maps import Alignment, component_name
+from mapweave.maps import Alignment, Submap, component_name
 from mapweave.progress import track
+from mapweave.weaving import Weaver, WeavingParameters
 from tests.benchmarks.logs import find_logs
 from tests.benchmarks.pairs import compare
 from tests.benchmarks.stretches import Stretch, map_stretches
@@ -26,6 +27,7 @@ from tests.benchmarks.tables import format_table
 FALSE_CONFIDENCE = 0.99  # the surest there is
 LEAST_ERROR = 2.0  # [m] that a false alignment is off
 SAME_POSE = 1e-3  # [m, rad]
+HEAD = "log|components joined|confidence|worst pose|woven|injected|held|undecided".split("|")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 class Team:
     """The stretches of a log as a team: their components, alignments and truth."""
 
+    submaps: Mapping[str, Sequence[Submap]]
     rasters: Mapping[str, MapRaster]
     alignments: Sequence[Alignment]
     frames: Mapping[str, FloatArray]
@@ -50,10 +53,16 @@ class Team:
         """Compare all `stretches`."""
         maps = [s.robot_map for s in stretches]
         lines = {component_name(m.robot, c): assemble(m, c) for m in maps for c in m.components}
+        submaps = {
+            component_name(m.robot, c): [s for s in m.submaps if s.component == c]
+            for m in maps
+            for c in m.components
+        }
         pairs = [compare(a, b) for a, b in track(list(combinations(stretches, 2)), "comparing")]
         parts = {name: part for s in stretches for name, part in s.parts.items()}
         p = RasterParameters()
         return cls(
+            submaps,
             {name: MapRaster.of(one, p) for name, one in lines.items() if len(one.segments)},
             [match.alignment for pair in pairs for match in pair.matches],
             {name: part.frame for name, part in parts.items()},
@@ -63,6 +72,11 @@ class Team:
     def join(self, alignments: Sequence[Alignment]) -> tuple[list[Cluster], Sequence[Alignment]]:
         """Return the clusters and what was judged of each of `alignments`."""
         return cluster_components(sorted(self.frames), alignments, GraphParameters(), self.rasters)
+
+    def weave(self, cluster: Cluster, judged: Sequence[Alignment]) -> Cluster:
+        """Return `cluster` with its robots' submaps moved to where they fit."""
+        woven, _ = Weaver(WeavingParameters(newest=True)).weave(cluster, self.submaps, judged)
+        return woven
 
     def errors(self, cluster: Cluster) -> list[tuple[float, float]]:
         """How far off each component lies, at the median over its map [m], and its turn [rad].
@@ -88,23 +102,29 @@ def run(options: argparse.Namespace) -> None:
     for log in find_logs(options.logs):
         team = Team.of(map_stretches(log, options.robots))
         clusters, judged = team.join(team.alignments)
-        rows.append([log.name, *_tell_clusters(team, clusters), *_tell_trials(team, options)])
+        woven = team.weave(clusters[0], judged)
+        rows.append(
+            [log.name, *_tell_clusters(team, clusters, woven), *_tell_trials(team, options)]
+        )
         for alignment in judged:
             if alignment.reason.startswith(SET_ASIDE):
                 print(f"  {alignment.reference} - {alignment.other}: {alignment.reason}")
-    head = ["log", "components joined", "confidence", "worst pose", "injected", "held", "undecided"]
-    print(format_table(head, rows))
+    print(format_table(HEAD, rows))
     print(
         "injected: false alignments between components that two ways join without it; held: set"
         " aside, named, poses as without it; undecided: others, between which one way or none is"
     )
 
 
-def _tell_clusters(team: Team, clusters: Sequence[Cluster]) -> list[str]:
+def _tell_clusters(team: Team, clusters: Sequence[Cluster], woven: Cluster) -> list[str]:
     joined = " + ".join(str(len(c.poses)) for c in clusters)
-    errors = team.errors(clusters[0])
-    worst, turn = max(e[0] for e in errors), np.degrees(max(e[1] for e in errors))
-    return [joined, percent(clusters[0].confidence), f"{worst:.2f} m, {turn:.1f}°"]
+    worst = [_tell_worst(team.errors(cluster)) for cluster in (clusters[0], woven)]
+    return [joined, percent(clusters[0].confidence), *worst]
+
+
+def _tell_worst(errors: Sequence[tuple[float, float]]) -> str:
+    distance, turn = (max(each) for each in zip(*errors, strict=True))
+    return f"{distance:.2f} m, {np.degrees(turn):.1f}°"
 
 
 def _tell_trials(team: Team, options: argparse.Namespace) -> list[str]:
