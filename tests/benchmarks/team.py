@@ -27,7 +27,7 @@ from tests.benchmarks.tables import format_table
 FALSE_CONFIDENCE = 0.99  # the surest there is
 LEAST_ERROR = 2.0  # [m] that a false alignment is off
 SAME_POSE = 1e-3  # [m, rad]
-HEAD = "log|components joined|confidence|worst pose|woven|injected|held|undecided".split("|")
+HEAD = ["log", "joined", "confidence", "worst pose", "woven", "injected", "held", "undecided"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
