@@ -45,10 +45,17 @@ class WeavingParameters(BaseModel):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Node:
-    """A submap of a component, at its pose (3,) in the cluster's frame."""
+    """A submap of a component, at its pose (3,) in the cluster's frame, and its middle there."""
 
     component: str
     submap: Submap
+    middle: tuple[float, float]
+
+    @classmethod
+    def of(cls, component: str, frame: FloatArray, submap: Submap) -> "_Node":
+        placed = replace(submap, pose=se2.compose(frame, submap.pose))
+        x, y = middle(placed).tolist()
+        return cls(component, placed, (x, y))
 
 
 class Weaver:
@@ -75,9 +82,7 @@ class Weaver:
             Those that are relied on.
         """
         nodes = [
-            _Node(name, replace(s, pose=se2.compose(pose, s.pose)))
-            for name, pose in cluster.poses.items()
-            for s in submaps[name]
+            _Node.of(name, pose, s) for name, pose in cluster.poses.items() for s in submaps[name]
         ]
         closures = list(self._closures(nodes))
         if not closures:
@@ -160,7 +165,7 @@ def _of(nodes: Sequence[_Node], component: str) -> list[int]:
 
 def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
     """[m] between the middles of two submaps."""
-    return math.dist(middle(nodes[first].submap), middle(nodes[second].submap))
+    return math.dist(nodes[first].middle, nodes[second].middle)
 
 
 def _lines(submaps: Sequence[Submap]) -> LineMap:
