@@ -8,6 +8,7 @@ from scipy.optimize import minimize
 from mapweave.arrays import BoolArray, FloatArray
 
 RIDGE = 0.1  # weight of half a slope² against one pair's loss; features are standardised
+MISTAKEN = 0.01  # share of outcomes
 BINS = 10
 
 
@@ -29,18 +30,21 @@ def fit_logistic(features: FloatArray, right: BoolArray) -> Logistic:
 
     Slopes are shrunk (ridge) and never negative: more evidence must not lower the confidence.
     The targets are Platt's: with n pairs of a kind seen, n + 1 of n + 2 are to be expected, so
-    that nothing ever becomes certain (Platt 1999, Probabilistic Outputs for SVMs, eq. 7).
+    that nothing ever becomes certain (Platt 1999, Probabilistic Outputs for SVMs, eq. 7). A few
+    outcomes are taken to be mistaken, as the poses are that decide what was right: one of them
+    costs little, however sure the model is, and does not bend it.
     """
     mean, spread = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-9)
     scaled = (features - mean) / spread
-    target = _smoothed(right)
+    target = MISTAKEN + (1 - 2 * MISTAKEN) * _smoothed(right)
 
     def loss(weights: FloatArray) -> tuple[float, FloatArray]:
-        odds = weights[0] + scaled @ weights[1:]
-        value = (
-            np.sum(np.logaddexp(0.0, odds) - target * odds) + RIDGE / 2 * weights[1:] @ weights[1:]
-        )
-        error = 1 / (1 + np.exp(-odds)) - target
+        chance = 1 / (1 + np.exp(-(weights[0] + scaled @ weights[1:])))
+        told = MISTAKEN + (1 - 2 * MISTAKEN) * chance
+        value = -np.sum(target * np.log(told) + (1 - target) * np.log(1 - told))
+        value += RIDGE / 2 * weights[1:] @ weights[1:]
+        inner = (1 - 2 * MISTAKEN) * chance * (1 - chance)
+        error = (told - target) / (told * (1 - told)) * inner
         slope = scaled.T @ error + RIDGE * weights[1:]
         return float(value), np.concatenate([[error.sum()], slope])
 

@@ -30,6 +30,16 @@ def test_outcomes_that_separate_perfectly_leave_a_doubt() -> None:
     assert said.min() > 0.001
 
 
+def test_a_mistaken_outcome_hardly_changes_the_model() -> None:
+    """The poses that decide what is right are off by degrees at some places."""
+    features = np.linspace(-3, 3, 400)[:, None]
+    right = np.random.default_rng(3).random(400) < Logistic(0.0, np.array([4.0])).predict(features)
+    mistaken = right.copy()
+    mistaken[-1] = False
+    said, asked = (fit_logistic(features, each).predict(features) for each in (right, mistaken))
+    assert np.abs(said - asked).max() < 0.03
+
+
 def test_evidence_never_lowers_the_confidence() -> None:
     rng = np.random.default_rng(2)
     features = rng.normal(size=(200, 2))
