@@ -59,14 +59,16 @@ class FusionParameters(BaseModel):
     min_complexity: float = Field(
         0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
     )
-    min_confidence: float = Field(0.9, gt=0, lt=1, description="of an accepted alignment")
+    min_confidence: float = Field(0.85, gt=0, lt=1, description="of an accepted alignment")
     max_rival: float = Field(
-        0.4,
+        0.5, gt=0, lt=1, description="score of the best different hypothesis, as a share"
+    )
+    min_lead: float = Field(
+        8.0,
         gt=0,
-        lt=1,
-        description="score of the best different hypothesis, as a share: at most 0.39 for right"
-        " transforms of stretches of the same logs and of Freiburg 079; 0.48 for a wrong one, of"
-        " 12 m in common, between two buildings",
+        description="[m] of score before the best different hypothesis: 8.4 m at least for right"
+        " transforms of stretches of the same logs and of Freiburg 079, but for one of 7.8 m;"
+        " 6.2 m for a wrong one between two buildings",
     )
 
 
@@ -228,13 +230,18 @@ def decide(
         return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
     if best.complexity < p.min_complexity:
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
-    if rival is not None and rival.verdict.score > p.max_rival * v.score:
+    if rival is not None and _is_close(rival.verdict, v, p):
         as_well = f"fits as well, with {_tell(rival.verdict)}"
         return "ambiguous", f"{found}; but {_elsewhere(best, rival)} {as_well}"
     next_best = _next_best(best, rival)
     if sure < p.min_confidence:
         return "ambiguous", f"{found}; {next_best}; too little to be sure ({sure:.0%})"
     return "accepted", f"{found}; {next_best}"
+
+
+def _is_close(rival: Verdict, best: Verdict, p: FusionParameters) -> bool:
+    """Whether the rival is so good that the best may be a look-alike."""
+    return rival.score > p.max_rival * best.score or best.score - rival.score < p.min_lead
 
 
 def _tell(verdict: Verdict) -> str:

@@ -9,10 +9,11 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place
-from mapweave.fusion import FusionParameters, align_maps, align_robots
+from mapweave.fusion import FusionParameters, Hypothesis, align_maps, align_robots, decide
 from mapweave.hypotheses import HypothesisParameters
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave.raster_alignment import RasterAlignmentParameters
+from mapweave.verification import Verdict
 from tests.mapweave.buildings import (
     BUILDING,
     OTHER_BUILDING,
@@ -245,3 +246,27 @@ def test_every_component_of_one_robot_is_compared_with_every_one_of_the_other() 
 
 def test_robots_without_a_map_have_nothing_to_compare() -> None:
     assert align_robots(robot_map("a"), robot_map("b", LEFT)) == []
+
+
+@pytest.mark.parametrize(
+    ("best", "rival", "decision"),
+    [
+        (12.0, 3.0, "accepted"),  # 9 m ahead
+        (12.0, 5.7, "ambiguous"),  # less than half of it, but only 6.3 m ahead
+        (40.0, 15.0, "accepted"),
+        (40.0, 25.0, "ambiguous"),  # 15 m ahead, but more than half of it
+        (12.0, -4.0, "accepted"),
+    ],
+)
+def test_the_best_leads_by_metres_and_by_its_share(
+    best: float, rival: float, decision: str
+) -> None:
+    """Of little wall in common, chance explains as much at two places."""
+
+    def hypothesis(score: float, x: float) -> Hypothesis:
+        verdict = Verdict(score, 0.0, 1.0, 0.02, 9.0, 5.0)
+        return Hypothesis(np.array([x, 0.0, 0.0]), np.array([x, 0.0]), verdict, 0.5)
+
+    found, reason = decide(hypothesis(best, 0), hypothesis(rival, 9), 0.95, FusionParameters())
+    assert found == decision
+    assert ("fits as well" in reason) == (decision == "ambiguous")
