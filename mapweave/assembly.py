@@ -1,10 +1,12 @@
 """A component of a robot map as one line map: its submaps at their poses."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
-from mapweave.maps import LineMap, RobotMap
+from mapweave.maps import LineMap, RobotMap, Submap, component_name
 
 
 def place(line_map: LineMap, pose: FloatArray) -> LineMap:
@@ -31,8 +33,20 @@ def unite_lines(line_maps: list[LineMap]) -> LineMap:
     )
 
 
+def lines_of(submaps: Iterable[Submap]) -> LineMap:
+    """Return the lines of `submaps` of one component in its frame, not merged."""
+    return unite_lines([place(s.map, s.pose) for s in submaps])
+
+
 def assemble(robot_map: RobotMap, component: int) -> LineMap:
     """Return all submaps of `component` in its frame, not merged."""
-    return unite_lines(
-        [place(s.map, s.pose) for s in robot_map.submaps if s.component == component]
-    )
+    return lines_of(s for s in robot_map.submaps if s.component == component)
+
+
+def submaps_by_component(maps: Iterable[RobotMap]) -> dict[str, list[Submap]]:
+    """Return the submaps of every component of `maps`, by its name."""
+    return {
+        component_name(m.robot, c): [s for s in m.submaps if s.component == c]
+        for m in maps
+        for c in m.components
+    }

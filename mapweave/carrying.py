@@ -20,12 +20,14 @@ from mapweave.maps import Alignment, RobotMap, Submap
 class SubmapPlace(NamedTuple):
     """Where a submap was: (3,) `pose` [m, m, rad] in component number `component`.
 
-    The index of its `first` scan tells whether it is the same: one that was cut shares its id.
+    The index of its `first` scan tells which one it is, as ids move on where one before is cut;
+    that of its `last` scan whether it was cut itself.
     """
 
     component: int
     pose: FloatArray
     first: int | None
+    last: int | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +40,7 @@ class Change:
 
 def places_of(robot_map: RobotMap) -> dict[int, SubmapPlace]:
     """Return where each submap is, by its id."""
-    return {s.id: SubmapPlace(s.component, s.pose, _first(s)) for s in robot_map.submaps}
+    return {s.id: SubmapPlace(s.component, s.pose, *_span(s)) for s in robot_map.submaps}
 
 
 def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
@@ -51,13 +53,14 @@ def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
     theirs = _then(other, alignment.other)
     if not ours or not theirs:
         return alignment
-    here = np.array([_middle(s, reference) for s in ours])
-    there = se2.transform_points(alignment.transform, np.array([_middle(s, other) for s in theirs]))
+    here = np.array([_middle(*each) for each in ours])
+    there = np.array([_middle(*each) for each in theirs])
+    there = se2.transform_points(alignment.transform, there)
     apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
     i, j = np.unravel_index(np.argmin(apart), apart.shape)
-    if _has_left(ours[i], reference) or _has_left(theirs[j], other):
+    if _has_left(*ours[i]) or _has_left(*theirs[j]):
         return _opened(alignment)
-    first, second = _motion(ours[i], reference), _motion(theirs[j], other)
+    first, second = _motion(*ours[i]), _motion(*theirs[j])
     if not (first.any() or second.any()):
         return alignment
     moved = se2.compose(first, se2.compose(alignment.transform, se2.inverse(second)))
@@ -71,38 +74,40 @@ def _opened(alignment: Alignment) -> Alignment:
     return replace(alignment, decision="ambiguous", reason=reason)
 
 
-def _then(change: Change, component: str) -> list[Submap]:
-    """Return the submaps, as they are now, that were in this component then."""
+def _then(change: Change, component: str) -> list[tuple[SubmapPlace, Submap]]:
+    """Return where submaps were in this component then, and what they are now."""
     number = int(component.rsplit("/", 1)[1])
-    return [
-        s
-        for s in change.now.submaps
-        if s.id in change.then
-        and change.then[s.id].component == number
-        and change.then[s.id].first == _first(s)
-    ]
+    now = {s.id if _span(s)[0] is None else ("scan", _span(s)[0]): s for s in change.now.submaps}
+    found = []
+    for identity, place in change.then.items():
+        submap = now.get(identity if place.first is None else ("scan", place.first))
+        if submap is not None and place.component == number:
+            found.append((place, submap))
+    return found
 
 
-def _has_left(submap: Submap, change: Change) -> bool:
-    return submap.component != change.then[submap.id].component
+def _has_left(then: SubmapPlace, now: Submap) -> bool:
+    """Whether a submap, or its last scans, are in another component."""
+    last = _span(now)[1]
+    cut = last is not None and then.last is not None and last < then.last
+    return now.component != then.component or cut
 
 
-def _first(submap: Submap) -> int | None:
-    """Return the index of a submap's first scan; None where it has none."""
+def _span(submap: Submap) -> tuple[int | None, int | None]:
+    """Return the indices of a submap's first and last scan; None where it has none."""
     indices = submap.trajectory.scan_index
-    return int(indices[0]) if len(indices) else None
+    return (int(indices[0]), int(indices[-1])) if len(indices) else (None, None)
 
 
-def _middle(submap: Submap, change: Change) -> FloatArray:
+def _middle(then: SubmapPlace, now: Submap) -> FloatArray:
     """(2,) middle of a submap's wall [m], where it was then in its component."""
-    ends = submap.map.segments.reshape(-1, 2)
+    ends = now.map.segments.reshape(-1, 2)
     middle = ends.mean(axis=0) if len(ends) else np.zeros(2)
-    return se2.transform_points(change.then[submap.id].pose, middle)
+    return se2.transform_points(then.pose, middle)
 
 
-def _motion(submap: Submap, change: Change) -> FloatArray:
+def _motion(then: SubmapPlace, now: Submap) -> FloatArray:
     """(3,) by which a submap has moved in its component's frame since then; zeros if not at all."""
-    before = change.then[submap.id].pose
-    if np.array_equal(before, submap.pose):
+    if np.array_equal(then.pose, now.pose):
         return np.zeros(3)
-    return se2.compose(submap.pose, se2.inverse(before))
+    return se2.compose(now.pose, se2.inverse(then.pose))

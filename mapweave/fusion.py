@@ -230,18 +230,14 @@ def decide(
         return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
     if best.complexity < p.min_complexity:
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
-    if rival is not None and _is_close(rival.verdict, v, p):
+    if rival is not None and rival.verdict.score > p.max_rival * v.score:
         as_well = f"fits as well, with {_tell(rival.verdict)}"
         return "ambiguous", f"{found}; but {_elsewhere(best, rival)} {as_well}"
     next_best = _next_best(best, rival)
-    if sure < p.min_confidence:
+    lead = v.score - (max(rival.verdict.score, 0.0) if rival else 0.0)
+    if sure < p.min_confidence or lead < p.min_lead:
         return "ambiguous", f"{found}; {next_best}; too little to be sure ({sure:.0%})"
     return "accepted", f"{found}; {next_best}"
-
-
-def _is_close(rival: Verdict, best: Verdict, p: FusionParameters) -> bool:
-    """Whether the rival is so good that the best may be a look-alike."""
-    return rival.score > p.max_rival * best.score or best.score - rival.score < p.min_lead
 
 
 def _tell(verdict: Verdict) -> str:

@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mapweave.alignment_graph import Cluster, GraphParameters, cluster_components
 from mapweave.arrays import FloatArray
-from mapweave.assembly import place, unite_lines
+from mapweave.assembly import lines_of, place, submaps_by_component, unite_lines
 from mapweave.free_space import FreeSpaceParameters, from_rings, rings, unite
 from mapweave.map_raster import MapRaster, RasterParameters
 from mapweave.maps import (
@@ -18,7 +18,6 @@ from mapweave.maps import (
     JointMap,
     LineMap,
     RobotMap,
-    component_name,
 )
 from mapweave.merging import MergingParameters, evolve
 from mapweave.polylines import group_polylines
@@ -62,11 +61,7 @@ def build_joint_map(
         without it components stay rigid.
     """
     p = parameters or JointParameters()
-    rasters = {
-        name: MapRaster.of(lines, p.raster)
-        for name, lines in components.items()
-        if len(lines.segments)
-    }
+    rasters = _rasters(components, p)
     clusters, judged = cluster_components(sorted(components), alignments, p.graph, rasters)
     joined = tuple(
         _join(cluster, components, rasters, p)
@@ -81,12 +76,8 @@ def build_team_map(
     maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int, weaver: Weaver
 ) -> JointMap:
     """Return what the team knows, its robots' submaps woven together."""
-    submaps = {
-        component_name(m.robot, c): [s for s in m.submaps if s.component == c]
-        for m in maps
-        for c in m.components
-    }
-    lines = {name: unite_lines([place(s.map, s.pose) for s in of]) for name, of in submaps.items()}
+    submaps = submaps_by_component(maps)
+    lines = {name: lines_of(each) for name, each in submaps.items()}
     return build_joint_map(
         lines,
         alignments,
@@ -98,12 +89,16 @@ def build_team_map(
 def _join_woven(
     cluster: Cluster, components: Mapping[str, LineMap], p: JointParameters
 ) -> JointComponent:
-    rasters = {
+    return _join(cluster, components, _rasters(components, p), p)
+
+
+def _rasters(components: Mapping[str, LineMap], p: JointParameters) -> dict[str, MapRaster]:
+    """Return the rasters of those components that have seen any wall."""
+    return {
         name: MapRaster.of(lines, p.raster)
         for name, lines in components.items()
         if len(lines.segments)
     }
-    return _join(cluster, components, rasters, p)
 
 
 def _join(

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.arrays import FloatArray
-from mapweave.assembly import place, unite_lines
+from mapweave.assembly import lines_of
 from mapweave.fusion import FusionParameters, compare, prepare
 from mapweave.hypotheses import Shape
 from mapweave.map_raster import MapRaster
-from mapweave.maps import LineMap, Submap
+from mapweave.maps import Submap
 from mapweave.parts import PartParameters, difference
 from mapweave.verification import verify
 
@@ -83,7 +83,7 @@ class Recognition:
         long = [c for c in others if self._is_long(submaps, c)]
         if len(part) < self._p.submaps or not long or not self._is_long(submaps, here):
             return None
-        newest = prepare(_lines(part), self._fusion)
+        newest = prepare(lines_of(part), self._fusion)
         for component in long:
             transform = self._found(part, newest, shape_of(component))
             if transform is not None:
@@ -105,7 +105,7 @@ class Recognition:
         alignment = compare("other", other, "newest", newest, self._fusion)
         if alignment.decision != "accepted" or other is None:
             return None
-        last = MapRaster.of(_lines(part[-1:]), self._fusion.raster)
+        last = MapRaster.of(lines_of(part[-1:]), self._fusion.raster)
         verdict = verify(other.raster, last, alignment.transform, self._fusion.verification)
         return alignment.transform if verdict.common >= self._fusion.min_common else None
 
@@ -114,8 +114,3 @@ class Recognition:
         middle = newest.raster.surface.points.mean(axis=0)
         apart, turned = difference(before.transform, found.transform, middle)
         return apart <= self._p.agreement.distance and turned <= self._p.agreement.turn
-
-
-def _lines(submaps: Sequence[Submap]) -> LineMap:
-    """Return the lines of `submaps`, not merged, in their component's frame."""
-    return unite_lines([place(s.map, s.pose) for s in submaps])

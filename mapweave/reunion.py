@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
-from mapweave.assembly import place, unite_lines
+from mapweave.assembly import lines_of
 from mapweave.fusion import FusionParameters, compare, prepare
 from mapweave.hypotheses import Shape
 from mapweave.maps import Alignment, Submap
@@ -161,8 +161,7 @@ class Reunion:
         now = tuple((s.map, s.pose.tobytes()) for s in inside)
         known, shape = self._shapes.get(component, (None, None))
         if known != now:
-            lines = unite_lines([place(s.map, s.pose) for s in inside])
-            shape = prepare(lines, self._p.fusion)
+            shape = prepare(lines_of(inside), self._p.fusion)
             self._shapes[component] = now, shape
         return shape
 

@@ -9,8 +9,8 @@ bend by as much; which robots are joined, and how sure that is, was decided befo
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.alignment_graph import Cluster
 from mapweave.arrays import FloatArray
-from mapweave.assembly import place, unite_lines
+from mapweave.assembly import lines_of, place, unite_lines
 from mapweave.loop_closing import LoopCloser, LoopParameters, middle
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.pose_graph import Link, optimise
@@ -26,21 +26,29 @@ from mapweave.submap_graph import joining_covariance, tracking_covariance
 
 
 class WeavingParameters(BaseModel):
-    """Which submaps are compared."""
+    """Which submaps are compared, and what alignments are worth beside that."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     loops: LoopParameters = LoopParameters(min_drift=0.9, min_turn=0.1, remembered=512)
     candidates: int = Field(2, ge=1, description="submaps of each component compared, the nearest")
+    most: int = Field(6, ge=1, description="submaps compared with one in all, the nearest")
     reach: float = Field(8.0, gt=0, description="[m] between the middles of submaps compared")
     step: float = Field(0.25, gt=0, description="[m] places nearer to each other are searched once")
     turn_step: float = Field(0.03, gt=0, description="[rad] the same for turns")
+    alignment_sigma: float = Field(
+        0.3, gt=0, description="[m] of an alignment where it is held: that of whole maps, bent"
+    )
+    alignment_turn: float = Field(0.03, gt=0, description="[rad] the same for the turn")
     newest: bool = Field(
         default=False,
         description="whether the newest submap of each component is compared as well: in a running"
         " team it grows with every message, and goes along with the one before",
     )
-    remembered: int = Field(4096, ge=1, description="comparisons")
+    at_once: int = Field(
+        200, ge=1, description="new comparisons, some seconds; what is left is compared next time"
+    )
+    remembered: int = Field(20_000, ge=1, description="comparisons, the last")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +62,18 @@ class _Node:
     @classmethod
     def of(cls, component: str, frame: FloatArray, submap: Submap) -> "_Node":
         placed = replace(submap, pose=se2.compose(frame, submap.pose))
-        x, y = middle(placed).tolist()
+        x, y = middle(placed).tolist() if len(submap.trajectory.pose) else placed.pose[:2].tolist()
         return cls(component, placed, (x, y))
+
+
+class _Comparison(NamedTuple):
+    """Two submaps' lines, and about which step (x, y, turn) they are compared, in steps."""
+
+    older: LineMap
+    newer: LineMap
+    x: int
+    y: int
+    turn: int
 
 
 class Weaver:
@@ -64,7 +82,7 @@ class Weaver:
     def __init__(self, parameters: WeavingParameters | None = None) -> None:
         self._p = parameters or WeavingParameters()
         self._loops = LoopCloser(self._p.loops)
-        self._found = lru_cache(self._p.remembered)(self._find)
+        self._known: dict[_Comparison, Link | None] = {}
 
     def weave(
         self,
@@ -86,24 +104,32 @@ class Weaver:
         ]
         closures = list(self._closures(nodes))
         if not closures:
-            return cluster, {name: _lines(submaps[name]) for name in cluster.poses}
+            return cluster, {name: lines_of(submaps[name]) for name in cluster.poses}
         links = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments), *closures]
         fitted, _ = optimise(np.array([n.submap.pose for n in nodes]), links)
         return _rooted(cluster, nodes, fitted)
 
     def _tracked(self, nodes: Sequence[_Node]) -> Iterator[Link]:
-        """Yield how each submap of a component lies to the one before."""
+        """Yield how each submap of a component lies to the one before, tracked or joined."""
         for k, (one, other) in enumerate(pairwise(nodes)):
             if one.component == other.component:
-                step = se2.between(one.submap.pose, other.submap.pose)
-                path = one.submap.trajectory
-                covariance = tracking_covariance(path, step, self._p.loops.graph)
+                step, p = se2.between(one.submap.pose, other.submap.pose), self._p.loops.graph
+                if _follows(one, other):
+                    covariance = tracking_covariance(one.submap.trajectory, step, p)
+                else:
+                    covariance = joining_covariance(p)
                 yield Link(k, k + 1, step, covariance, True)
 
     def _aligned(
         self, nodes: Sequence[_Node], cluster: Cluster, alignments: Sequence[Alignment]
     ) -> Iterator[Link]:
-        """Yield how alignments lay those submaps to each other that they bring nearest."""
+        """Yield how alignments lay those submaps to each other that are nearest.
+
+        Loosely: where submaps themselves were found in each other, that says more.
+        """
+        p = self._p
+        loose = np.array([p.alignment_sigma, p.alignment_sigma, p.alignment_turn])
+        covariance = np.diag(loose**2)
         for a in alignments:
             ours, theirs = (_of(nodes, name) for name in (a.reference, a.other))
             if a.decision != "accepted" or not (ours and theirs):
@@ -115,17 +141,28 @@ class Weaver:
                 for frame, k in zip(frames, (i, j), strict=True)
             )
             step = se2.between(first, se2.compose(a.transform, second))
-            yield Link(i, j, step, joining_covariance(self._p.loops.graph), True)
+            yield Link(i, j, step, covariance, True)
 
     def _closures(self, nodes: Sequence[_Node]) -> Iterator[Link]:
         """Yield how submaps lie to each other that saw the same walls."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
+        left = self._p.at_once
         for first, second in self._candidates(nodes):
             older, newer = nodes[first].submap, nodes[second].submap
-            believed = np.round(se2.between(older.pose, newer.pose) / steps)
-            link = self._found(older.map, newer.map, *(int(v) for v in believed))
+            x, y, turn = np.round(se2.between(older.pose, newer.pose) / steps).astype(int).tolist()
+            asked = _Comparison(older.map, newer.map, x, y, turn)
+            if asked not in self._known and left > 0:
+                left -= 1
+                self._remember(asked)
+            link = self._known.get(asked)
             if link is not None:
                 yield replace(link, first=first, second=second)
+
+    def _remember(self, asked: _Comparison) -> None:
+        """Compare, and forget the oldest comparison where there are too many."""
+        self._known[asked] = self._compared(asked)
+        if len(self._known) > self._p.remembered:
+            del self._known[next(iter(self._known))]
 
     def _candidates(self, nodes: Sequence[_Node]) -> Iterator[tuple[int, int]]:
         """Yield pairs of nodes near each other that tracking does not link."""
@@ -133,12 +170,12 @@ class Weaver:
         compared = [k for k in self._finished(nodes) if len(nodes[k].submap.map.segments)]
         for k in compared:
             near: dict[str, list[tuple[float, int]]] = {}
-            for j in (j for j in compared if j < k):
-                if k - j > 1 or nodes[j].component != nodes[k].component:
-                    near.setdefault(nodes[j].component, []).append((_apart(nodes, j, k), j))
-            for those in near.values():
-                nearest = sorted(those)[: p.candidates]
-                yield from ((j, k) for distance, j in nearest if distance < p.reach)
+            for j in (j for j in compared if j < k and not _is_tracked(nodes, j, k)):
+                near.setdefault(nodes[j].component, []).append((_apart(nodes, j, k), j))
+            nearest = sorted(
+                pair for those in near.values() for pair in sorted(those)[: p.candidates]
+            )
+            yield from ((j, k) for distance, j in nearest[: p.most] if distance < p.reach)
 
     def _finished(self, nodes: Sequence[_Node]) -> list[int]:
         """Return the nodes without the newest of each component, unless that is its only one."""
@@ -150,13 +187,24 @@ class Weaver:
             if self._p.newest or node.component == following[k] or node.component != before[k]
         ]
 
-    def _find(self, older: LineMap, newer: LineMap, x: int, y: int, turn: int) -> Link | None:
-        """Look for `newer` in `older` about the step (x, y, turn), in units of the parameters."""
-        p = self._p
-        believed = np.array([x * p.step, y * p.step, turn * p.turn_step])
-        path = Trajectory.empty()
-        first = Submap(0, 0, se2.IDENTITY, older, path)
-        return self._loops.compare_two(first, Submap(1, 0, believed, newer, path), 0.0).link
+    def _compared(self, asked: _Comparison) -> Link | None:
+        """Look for the newer of two submaps in the older one."""
+        p, path = self._p, Trajectory.empty()
+        believed = np.array([asked.x * p.step, asked.y * p.step, asked.turn * p.turn_step])
+        older = Submap(0, 0, se2.IDENTITY, asked.older, path)
+        newer = Submap(1, 0, believed, asked.newer, path)
+        return self._loops.compare_two(older, newer, 0.0).link
+
+
+def _follows(one: _Node, other: _Node) -> bool:
+    """Whether the second was finished right after the first."""
+    return other.submap.id == one.submap.id + 1
+
+
+def _is_tracked(nodes: Sequence[_Node], first: int, second: int) -> bool:
+    """Whether tracking links two nodes."""
+    one, other = nodes[first], nodes[second]
+    return one.component == other.component and _follows(one, other)
 
 
 def _of(nodes: Sequence[_Node], component: str) -> list[int]:
@@ -166,10 +214,6 @@ def _of(nodes: Sequence[_Node], component: str) -> list[int]:
 def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
     """[m] between the middles of two submaps."""
     return math.dist(nodes[first].middle, nodes[second].middle)
-
-
-def _lines(submaps: Sequence[Submap]) -> LineMap:
-    return unite_lines([place(s.map, s.pose) for s in submaps])
 
 
 def _rooted(

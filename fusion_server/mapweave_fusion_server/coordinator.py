@@ -29,7 +29,7 @@ class CoordinatorParameters(BaseModel):
 
     min_interval: float = Field(default=2.0, ge=0, allow_inf_nan=False)
     """Least time between two versions [s] unless an alignment is joined or revoked: a person
-    watching sees the map grow, and building takes a fraction of it."""
+    watching sees the map grow. Of a large team building takes longer; the next one waits."""
 
     max_robots: int = Field(default=64, ge=1)
     """Robots listened to; the largest teams of the DARPA Subterranean Challenge had a dozen."""

@@ -61,7 +61,9 @@ def fuse(maps: list[RobotMap]) -> JointMap:
     alignments = [
         a for first, second in track(pairs, "comparing") for a in align_robots(first, second)
     ]
-    return build_team_map(maps, alignments, 1, Weaver(WeavingParameters(newest=True)))
+    # Nothing grows any more, and there is no next time.
+    weaver = Weaver(WeavingParameters(newest=True, at_once=1_000_000))
+    return build_team_map(maps, alignments, 1, weaver)
 
 
 def tell(joint: JointMap) -> list[str]:

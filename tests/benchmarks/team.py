@@ -11,12 +11,12 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.alignment_graph import SET_ASIDE, Cluster, GraphParameters, cluster_components
 from mapweave.arrays import FloatArray
-from mapweave.assembly import assemble
+from mapweave.assembly import lines_of, submaps_by_component
 from mapweave.confidence import percent
 from mapweave.cuts import weakest_cut
 from mapweave.cycles import Edge
 from mapweave.map_raster import MapRaster, RasterParameters
-from mapweave.maps import Alignment, Submap, component_name
+from mapweave.maps import Alignment, Submap
 from mapweave.progress import track
 from mapweave.weaving import Weaver, WeavingParameters
 from tests.benchmarks.logs import find_logs
@@ -52,12 +52,8 @@ class Team:
     def of(cls, stretches: Sequence[Stretch]) -> "Team":
         """Compare all `stretches`."""
         maps = [s.robot_map for s in stretches]
-        lines = {component_name(m.robot, c): assemble(m, c) for m in maps for c in m.components}
-        submaps = {
-            component_name(m.robot, c): [s for s in m.submaps if s.component == c]
-            for m in maps
-            for c in m.components
-        }
+        submaps = submaps_by_component(maps)
+        lines = {name: lines_of(each) for name, each in submaps.items()}
         pairs = [compare(a, b) for a, b in track(list(combinations(stretches, 2)), "comparing")]
         parts = {name: part for s in stretches for name, part in s.parts.items()}
         p = RasterParameters()
@@ -75,7 +71,9 @@ class Team:
 
     def weave(self, cluster: Cluster, judged: Sequence[Alignment]) -> Cluster:
         """Return `cluster` with its robots' submaps moved to where they fit."""
-        woven, _ = Weaver(WeavingParameters(newest=True)).weave(cluster, self.submaps, judged)
+        woven, _ = Weaver(WeavingParameters(newest=True, at_once=100_000)).weave(
+            cluster, self.submaps, judged
+        )
         return woven
 
     def errors(self, cluster: Cluster) -> list[tuple[float, float]]:

@@ -115,3 +115,35 @@ def test_a_submap_that_took_the_id_of_one_that_was_cut_is_another() -> None:
     other = corrected(replace(B, submaps=submaps), 1)
     found = alignment(FOUND)
     assert carry(found, still(A), Change(places_of(B), other)) is found
+
+
+def scanned(number: int, component: int, pose: FloatArray, scans: range) -> Submap:
+    indices = np.arange(scans.start, scans.stop)
+    path = Trajectory(indices, np.zeros(len(indices)), np.zeros((len(indices), 3)))
+    return Submap(number, component, pose, ROOM, path)
+
+
+def test_what_was_found_on_a_submap_that_was_cut_is_open_again() -> None:
+    """Its last scans were found to be elsewhere; which ones were compared, nobody knows."""
+    there = B.submaps[1].pose
+    then = replace(
+        B, submaps=(scanned(0, 0, np.zeros(3), range(9)), scanned(1, 0, there, range(9, 30)))
+    )
+    front, rear = scanned(1, 0, there, range(9, 20)), scanned(2, 4, there, range(20, 30))
+    cut = replace(then, submaps=(then.submaps[0], front, rear))
+    carried = carry(alignment(FOUND), still(A), Change(places_of(then), cut))
+    assert carried.decision == "ambiguous"
+
+
+def test_a_submap_whose_number_moved_on_is_still_the_same() -> None:
+    """One before it was cut in two meanwhile; it grew as well, and is elsewhere now."""
+    there = B.submaps[1].pose
+    then = replace(
+        B, submaps=(scanned(0, 0, np.zeros(3), range(9)), scanned(1, 0, there, range(9, 30)))
+    )
+    front, rear = scanned(0, 0, np.zeros(3), range(5)), scanned(1, 4, np.zeros(3), range(5, 9))
+    for component, decision in ((0, "accepted"), (4, "ambiguous")):
+        grown = scanned(2, component, there, range(9, 40))
+        now = replace(then, submaps=(front, rear, grown))
+        carried = carry(alignment(FOUND), still(A), Change(places_of(then), now))
+        assert carried.decision == decision

@@ -1,5 +1,7 @@
 """Robots that were joined are woven together: each submap lies where it fits all others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.random import Generator
@@ -91,8 +93,7 @@ def test_the_frames_of_the_components_change_nothing(frames: FloatArray) -> None
     np.testing.assert_allclose(distances[0], distances[1], atol=0.02)
 
 
-def test_robots_that_saw_nothing_in_common_stay_rigid(frames: FloatArray) -> None:
-    """As where an alignment through others is all that is known of them."""
+def test_robots_that_are_nowhere_near_each_other_stay_rigid(frames: FloatArray) -> None:
     cluster, robots, _ = team(BENT, frames)
     far = Cluster({"a/0": np.zeros(3), "b/0": np.array([500.0, 0.0, 0.0])}, cluster.confidence)
     woven, lines = Weaver().weave(far, robots, [])
@@ -118,6 +119,34 @@ def test_what_was_compared_once_is_not_compared_again(
     monkeypatch.delattr(LoopCloser, "compare_two")
     again, _ = weaver.weave(cluster, robots, alignments)
     np.testing.assert_array_equal(again.poses["b/0"], first.poses["b/0"])
+
+
+def test_what_is_not_compared_at_once_is_compared_the_next_time(frames: FloatArray) -> None:
+    """A coordinator that starts anew makes a version all the same."""
+    cluster, robots, alignments = team(BENT, frames)
+    weaver = Weaver(WeavingParameters(newest=True, at_once=5))
+    before = [apart(*weaver.weave(cluster, robots, alignments)).max() for _ in range(12)]
+    assert before[0] > before[-1]
+    assert before[-1] < 0.1
+
+
+def test_three_robots_and_one_that_saw_nothing_are_woven(frames: FloatArray) -> None:
+    """The third has walked through it all again, and the fourth is blind."""
+    cluster, robots, alignments = team(BENT, frames)
+    third = [replace(s, id=s.id + 3 * (s.id > 4)) for s in submaps(0.0, frames[1])]  # was lost once
+    blind = [Submap(0, 0, np.zeros(3), LineMap.empty(), Trajectory.empty())]
+    everyone = {**robots, "c/0": third, "d/0": blind}
+    there = se2.compose(robots["a/0"][4].pose, se2.inverse(third[4].pose))
+    links = [
+        *alignments,
+        Alignment("a/0", "c/0", there, "accepted", 0.99, "so"),
+        Alignment("a/0", "d/0", there, "accepted", 0.99, "so"),
+    ]
+    poses = {**cluster.poses, "c/0": there, "d/0": there}
+    woven, lines = WHOLE.weave(Cluster(poses, 0.99), everyone, links)
+    assert apart(woven, lines).max() < 0.12
+    assert np.isfinite(np.array(list(woven.poses.values()))).all()
+    np.testing.assert_allclose(woven.poses["d/0"], there, atol=0.5)
 
 
 def test_a_joint_map_of_bent_robots_has_no_wall_twice(frames: FloatArray) -> None:
