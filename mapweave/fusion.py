@@ -65,7 +65,7 @@ class FusionParameters(BaseModel):
     )
     min_lead: float = Field(
         8.0,
-        gt=0,
+        ge=0,
         description="[m] of score before the best different hypothesis: 8.4 m at least for right"
         " transforms of stretches of the same logs and of Freiburg 079, but for one of 7.8 m;"
         " 6.2 m for a wrong one between two buildings",

@@ -36,6 +36,9 @@ class ReunionParameters(BaseModel):
         description="of a place where the robot lost track: that it is there needs less proof than"
         " that it is anywhere",
     )
+    min_lead: float = Field(
+        0.0, ge=0, description="[m] of score before the next best place, there: its share decides"
+    )
     growth: float = Field(
         0.15, gt=0, description="share by which either has grown before a pair is compared again"
     )
@@ -149,7 +152,8 @@ class Reunion:
         possible = _between_them(submaps, older, younger, p)
         if anywhere.decision == "accepted" or len(possible) == 0:
             return anywhere
-        expected = p.fusion.model_copy(update={"min_confidence": p.min_confidence})
+        proof = {"min_confidence": p.min_confidence, "min_lead": p.min_lead}
+        expected = p.fusion.model_copy(update=proof)
         here = compare(names[0], first, names[1], second, expected, possible)
         # A better place elsewhere says that it was carried away.
         best = max(anywhere.evidence.get("score", 0.0), 0.0)

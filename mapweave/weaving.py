@@ -97,7 +97,7 @@ class Weaver:
         submaps
             Of each component of the cluster, by its name.
         alignments
-            Those that are relied on.
+            As they were judged; the accepted ones of the cluster's components are relied on.
         """
         nodes = [
             _Node.of(name, pose, s) for name, pose in cluster.poses.items() for s in submaps[name]
@@ -134,7 +134,9 @@ class Weaver:
             ours, theirs = (_of(nodes, name) for name in (a.reference, a.other))
             if a.decision != "accepted" or not (ours and theirs):
                 continue
-            i, j = min(((i, j) for i in ours for j in theirs), key=lambda p: _apart(nodes, *p))
+            i, j = min(
+                ((i, j) for i in ours for j in theirs), key=lambda pair: _apart(nodes, *pair)
+            )
             frames = cluster.poses[a.reference], cluster.poses[a.other]
             first, second = (
                 se2.between(frame, nodes[k].submap.pose)
@@ -219,9 +221,12 @@ def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
 def _rooted(
     cluster: Cluster, nodes: Sequence[_Node], fitted: FloatArray
 ) -> tuple[Cluster, dict[str, LineMap]]:
-    """Return where components are as wholes, the first at the origin, and their lines at `fitted`.
+    """Return where components are as wholes, the first at the origin, and their lines.
 
-    (n, 3) of the nodes.
+    Parameters
+    ----------
+    fitted
+        (n, 3) where the nodes fit [m, m, rad].
     """
     poses, lines = {}, {}
     for name, frame in cluster.poses.items():
