@@ -9,6 +9,7 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place
+from mapweave.fusion import FusionParameters
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.reunion import Reunion, ReunionParameters, _covering
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, corridor, part, random_pose, shaken
@@ -159,6 +160,25 @@ def test_a_robot_that_lost_track_is_looked_for_where_it_lost_it(rng: Generator) 
     joined, joints = Reunion().reunite(submaps)
     assert joints == [(0, 1)]
     np.testing.assert_allclose(joined[1].pose, [19.86, 1.2, 0.3], atol=0.15)
+
+
+def test_where_track_was_lost_less_proof_is_asked_for_than_anywhere(
+    rng: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A place that leads the next best by little counts there, and nowhere else."""
+    asked: list[tuple[bool, float, float]] = []
+
+    def refuse(
+        a: str, _: object, b: str, __: object, p: FusionParameters, possible: object = None
+    ) -> Alignment:
+        asked.append((possible is not None, p.min_confidence, p.min_lead))
+        return Alignment(a, b, np.zeros(3), "ambiguous", 0.0, "so")
+
+    monkeypatch.setattr("mapweave.reunion.compare", refuse)
+    parts = [shaken(part(TWINS, 8, 40), rng), shaken(part(TWINS, 12, 22), rng)]
+    Reunion().reunite(broken(parts, np.array([0.8, 0.2, 0.3])))
+    (_, sure, lead), (there, sure_there, lead_there) = asked
+    assert there and sure_there < sure and lead_there < lead
 
 
 @pytest.mark.parametrize(("steps", "joint"), [(1, [(0, 2)]), (8, [])])
