@@ -1,13 +1,12 @@
 """Map fusion: the transform between two maps, or a reason why there is none (paper, VIII).
 
-Hypothesise by shape (H1, H2), align (V1), verify by what both maps saw (V2), decide. The best
-hypothesis must explain much wall, contradict little free space, be held in every direction, share
-a shape, and leave the best *different* hypothesis far behind. Each condition that fails is the
-reason given. Where whole maps cannot be joined their parts are compared: maps may be bent.
+Hypothesise by shape (H1, H2), align (V1), verify by what both maps saw (V2), decide. Where whole
+maps cannot be joined their parts are compared: maps may be bent. So an alignment of the right
+places is accepted only as far as it is right for the rest of the maps as well.
 """
 
 import itertools
-from dataclasses import asdict, dataclass
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -16,20 +15,19 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import assemble
-from mapweave.confidence import ConfidenceParameters, confidence
+from mapweave.confidence import ConfidenceParameters, confidence, percent
+from mapweave.decision import DecisionParameters, Hypothesis, decide, numbers, runner_up
 from mapweave.hypotheses import HypothesisParameters, Shape, different, hypothesise
 from mapweave.icp import IcpParameters, Target, align_all
 from mapweave.map_raster import RasterParameters
-from mapweave.maps import Alignment, Decision, LineMap, RobotMap, component_name
+from mapweave.maps import Alignment, LineMap, RobotMap, component_name
 from mapweave.parts import PartParameters, agreed, cut
-from mapweave.verification import Verdict, VerificationParameters, shared_complexity, verify
+from mapweave.reach import ReachParameters, holds, reach
+from mapweave.verification import VerificationParameters, shared_complexity, verify
 
 
 class FusionParameters(BaseModel):
-    """One model for each stage, and what an alignment must show to be accepted.
-
-    The limits were set on stretches of the Intel, CSAIL and Seattle logs.
-    """
+    """One model for each stage."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -43,56 +41,9 @@ class FusionParameters(BaseModel):
     loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
     confidence: ConfidenceParameters = ConfidenceParameters()
     parts: PartParameters = PartParameters()
+    decision: DecisionParameters = DecisionParameters()
+    reach: ReachParameters = ReachParameters()
     min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
-    min_common: float = Field(6.0, gt=0, description="[m] of wall in common")
-    min_overlap: float = Field(
-        0.95,
-        gt=0,
-        le=1,
-        description="of the wall that both looked at, the share in common: at least 0.976 for right"
-        " transforms of stretches of the Intel, CSAIL and Seattle logs; 0.91 for a wrong one in the"
-        " look-alike corridors of Killian Court",
-    )
-    min_held: float = Field(
-        2.5, gt=0, description="[m] of common wall across the weakest direction"
-    )
-    min_complexity: float = Field(
-        0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
-    )
-    min_confidence: float = Field(0.85, gt=0, lt=1, description="of an accepted alignment")
-    max_rival: float = Field(
-        0.5, gt=0, lt=1, description="score of the best different hypothesis, as a share"
-    )
-    min_lead: float = Field(
-        8.0,
-        ge=0,
-        description="[m] of score before the best different hypothesis: 8.4 m at least for right"
-        " transforms of stretches of the same logs and of Freiburg 079, but for one of 7.8 m;"
-        " 6.2 m for a wrong one between two buildings",
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Hypothesis:
-    """An aligned hypothesis with its verdict.
-
-    Attributes
-    ----------
-    transform
-        (3,) from the other map to the reference [m, m, rad].
-    place
-        (2,) where it takes the middle of the other map's wall [m]: what tells hypotheses apart,
-        because it depends on no frame.
-    verdict
-        What both maps say of it.
-    complexity
-        [rad²] of what is shared (V2).
-    """
-
-    transform: FloatArray
-    place: FloatArray
-    verdict: Verdict
-    complexity: float
 
 
 def align_robots(
@@ -123,16 +74,42 @@ class _Component:
 def _align(first: _Component, second: _Component, p: FusionParameters) -> Alignment:
     """Compare two components; in parts, where as wholes they cannot be joined: they may be bent."""
     whole = compare(first.name, first.whole, second.name, second.whole, p)
-    if whole.decision == "accepted":
-        return whole
+    found = whole if whole.decision == "accepted" else _in_parts(first, second, p) or whole
+    return _for_wholes(found, first.whole, second.whole, p)
+
+
+def _in_parts(first: _Component, second: _Component, p: FusionParameters) -> Alignment | None:
+    """Return the alignment that parts of two components agree about; None if there is none."""
     pairs = list(itertools.product(first.parts, second.parts))
     if len(pairs) < 2:
-        return whole
+        return None
     found = [(compare(first.name, a, second.name, b, p), b) for a, b in pairs]
     joined = [
         (x, b.raster.surface.points.mean(axis=0)) for x, b in found if x.decision == "accepted"
     ]
-    return agreed([x for x, _ in joined], np.array([m for _, m in joined]), p.parts) or whole
+    return agreed([x for x, _ in joined], np.array([m for _, m in joined]), p.parts)
+
+
+def _for_wholes(
+    found: Alignment, first: Shape | None, second: Shape | None, p: FusionParameters
+) -> Alignment:
+    """Return `found` with the confidence that it is right for the maps as wholes, which are bent.
+
+    Where only that keeps them apart its evidence tells how sure the `place` is.
+    """
+    if first is None or second is None or not found.evidence:
+        return found
+    far = reach(first.raster, second.raster, found.transform, p.verification)
+    sure = found.confidence * holds(far, p.reach)
+    evidence = {**found.evidence, "reach": far}
+    if found.decision != "accepted" or sure >= p.decision.min_confidence:
+        return replace(found, confidence=sure, evidence=evidence)
+    reason = (
+        f"{found.reason}; but from there the maps go on for {far:.0f} m, where they may be bent"
+        f" by more than {p.reach.tolerance:g} m: right as a whole with {percent(sure)} only"
+    )
+    evidence["place"] = found.confidence
+    return replace(found, decision="ambiguous", confidence=sure, reason=reason, evidence=evidence)
 
 
 def align_maps(
@@ -143,7 +120,8 @@ def align_maps(
     """Find the transform from `other` to `reference`, each a component's name and its lines."""
     p = parameters or FusionParameters()
     (a, first), (b, second) = reference, other
-    return compare(a, prepare(first, p), b, prepare(second, p), p)
+    prepared = prepare(first, p), prepare(second, p)
+    return _for_wholes(compare(a, prepared[0], b, prepared[1], p), *prepared, p)
 
 
 def prepare(lines: LineMap, p: FusionParameters) -> Shape | None:
@@ -176,7 +154,7 @@ def compare(
         return _no_alignment(a, b, "no part of one has the shape of a part of the other")
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
-    decision, reason = decide(best, rival, sure, p)
+    decision, reason = decide(best, rival, sure, p.decision)
     return Alignment(
         a,
         b,
@@ -184,8 +162,8 @@ def compare(
         decision,
         sure,
         reason,
-        _numbers(best),
-        None if rival is None else _runner_up(best, rival),
+        numbers(best),
+        None if rival is None else runner_up(best, rival),
     )
 
 
@@ -212,59 +190,6 @@ def find_alignments(
     ]
 
 
-def decide(
-    best: Hypothesis, rival: Hypothesis | None, sure: float, p: FusionParameters
-) -> tuple[Decision, str]:
-    """Return the decision and one sentence that gives the reason; `sure` is the confidence."""
-    v = best.verdict
-    found = _tell(v)
-    if v.common < p.min_common:
-        return "refused", f"only {v.common:.1f} m of wall in common"
-    if v.overlap < p.min_overlap:
-        return (
-            "refused",
-            f"{v.common:.0f} m of wall in common, but {v.contradicted:.0f} m of wall"
-            " where the other saw free space",
-        )
-    if v.held < p.min_held:
-        return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
-    if best.complexity < p.min_complexity:
-        return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
-    if rival is not None and rival.verdict.score > p.max_rival * v.score:
-        as_well = f"fits as well, with {_tell(rival.verdict)}"
-        return "ambiguous", f"{found}; but {_elsewhere(best, rival)} {as_well}"
-    next_best = _next_best(best, rival)
-    lead = v.score - (max(rival.verdict.score, 0.0) if rival else 0.0)
-    if sure < p.min_confidence or lead < p.min_lead:
-        return "ambiguous", f"{found}; {next_best}; too little to be sure ({sure:.0%})"
-    return "accepted", f"{found}; {next_best}"
-
-
-def _tell(verdict: Verdict) -> str:
-    return f"{verdict.common:.0f} m of wall in common, {verdict.contradicted:.1f} m contradicted"
-
-
-def _next_best(best: Hypothesis, rival: Hypothesis | None) -> str:
-    """The rival and what speaks for and against it, in words."""
-    if rival is None or rival.verdict.common < 1:
-        return "nothing else fits"
-    return f"next best, {_elsewhere(best, rival)}, has {_tell(rival.verdict)}"
-
-
-def _elsewhere(best: Hypothesis, rival: Hypothesis) -> str:
-    """How the rival differs, in words."""
-    distance, turn = _difference(best, rival)
-    away, degrees = f"{distance:.0f} m away", np.degrees(turn)
-    return away if degrees < 9 else f"{away} and turned by {degrees:.0f}°"
-
-
-def _difference(best: Hypothesis, rival: Hypothesis) -> tuple[float, float]:
-    """How far apart two hypotheses put the other map [m], and how differently turned [rad]."""
-    x, y = rival.place - best.place
-    turn = se2.wrap(rival.transform[2] - best.transform[2])
-    return float(np.hypot(x, y)), float(abs(turn))
-
-
 def _refined(first: Shape, second: Shape, starts: FloatArray, p: FusionParameters) -> FloatArray:
     """Align the walls of `second` to those of `first` (V1) from each of (k, 3) `starts`."""
     surface = second.raster.surface
@@ -283,23 +208,6 @@ def _complexity(first: Shape, second: Shape, transform: FloatArray, p: FusionPar
         shared_complexity(first.raster, second.raster, transform, second.lines, p.verification),
         shared_complexity(second.raster, first.raster, back, first.lines, p.verification),
     )
-
-
-def _numbers(hypothesis: Hypothesis) -> dict[str, float]:
-    """The evidence by name, with the score."""
-    verdict = hypothesis.verdict
-    numbers = {k: float(v) for k, v in asdict(verdict).items() if k != "contradiction_weight"}
-    return {**numbers, "complexity": hypothesis.complexity, "score": verdict.score}
-
-
-def _runner_up(best: Hypothesis, rival: Hypothesis) -> dict[str, object]:
-    distance, turn = _difference(best, rival)
-    return {
-        "transform": [float(v) for v in rival.transform],
-        "distance": distance,
-        "turn": turn,
-        **_numbers(rival),
-    }
 
 
 def _no_alignment(a: str, b: str, reason: str) -> Alignment:

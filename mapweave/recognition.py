@@ -107,7 +107,7 @@ class Recognition:
             return None
         last = MapRaster.of(lines_of(part[-1:]), self._fusion.raster)
         verdict = verify(other.raster, last, alignment.transform, self._fusion.verification)
-        return alignment.transform if verdict.common >= self._fusion.min_common else None
+        return alignment.transform if verdict.common >= self._fusion.decision.min_common else None
 
     def _agree(self, before: Recognised, found: Recognised, newest: Shape) -> bool:
         """Whether the part before was found at the same place."""

@@ -153,7 +153,9 @@ class Reunion:
         if anywhere.decision == "accepted" or len(possible) == 0:
             return anywhere
         proof = {"min_confidence": p.min_confidence, "min_lead": p.min_lead}
-        expected = p.fusion.model_copy(update=proof)
+        expected = p.fusion.model_copy(
+            update={"decision": p.fusion.decision.model_copy(update=proof)}
+        )
         here = compare(names[0], first, names[1], second, expected, possible)
         # A better place elsewhere says that it was carried away.
         best = max(anywhere.evidence.get("score", 0.0), 0.0)

@@ -188,11 +188,21 @@ def shared_complexity(
     lines
         The line map that `other` is the raster of.
     """
-    coincides = _one_way(reference, other, transform, parameters).coincides
+    coincides = coinciding(reference, other, transform, parameters)
     counts = np.bincount(other.segment, minlength=len(lines.segments))
     hits = np.bincount(other.segment[coincides], minlength=len(lines.segments))
     shared = hits >= parameters.shared_part * np.maximum(counts, 1)
     return float(complexities(lines.segments[shared], lines.polyline[shared]).max(initial=0.0))
+
+
+def coinciding(
+    reference: MapRaster,
+    other: MapRaster,
+    transform: FloatArray,
+    parameters: VerificationParameters,
+) -> BoolArray:
+    """Tell which samples (n,) of the walls of `other` are on walls of `reference`."""
+    return _one_way(reference, other, transform, parameters).coincides
 
 
 def _one_way(

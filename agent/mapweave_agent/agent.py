@@ -2,13 +2,14 @@
 
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import zenoh
 
+from mapweave.keeping import keep_joined
 from mapweave.mapper import Mapper
-from mapweave.maps import RobotMap
+from mapweave.maps import Alignment, RobotMap
 from mapweave.scan import Scan
 from mapweave_agent.comparer import Comparer, Outcome
 from mapweave_agent.comparing import ComparisonPlan
@@ -144,27 +145,30 @@ class Agent:
         """Publish the outcome of the comparison under way, if there is one; begin the next."""
         outcome = self._comparer.take()
         if outcome is not None:
-            self._publish_outcome(outcome)
-            self._comparisons.done(outcome.comparison, now, outcome.took)
+            found = self._publish_outcome(outcome)
+            self._comparisons.done(outcome.comparison, now, outcome.took, found)
             self._publish_status()
         if not self._comparer.busy:
             comparison = self._comparisons.begin(now)
             if comparison is not None:
                 self._comparer.start(comparison)
 
-    def _publish_outcome(self, outcome: Outcome) -> None:
+    def _publish_outcome(self, outcome: Outcome) -> Sequence[Alignment] | None:
+        """Return what was published, None where comparing failed."""
         comparison = outcome.comparison
         if outcome.alignments is None:
             # What was found out about earlier versions of the pair stands.
             _log.error("comparing with %s failed: %s", comparison.peer, outcome.failure)
-            return
+            return None
+        found = keep_joined(outcome.alignments, self._comparisons.found_before(comparison))
         message = AlignmentMessage.pack(
             self._mapper.robot,
             MapVersion.of(comparison.reference),
             MapVersion.of(comparison.other),
-            outcome.alignments,
+            found,
         )
         self._outbox.send_alignments(message)
+        return found
 
     def _publish_map(self, *, complete: bool) -> None:
         self._published = without_strays(self._mapper.robot_map())

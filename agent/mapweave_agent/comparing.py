@@ -1,9 +1,9 @@
 """Which pair of maps to compare next; no clock and no network in here."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from mapweave.maps import RobotMap
+from mapweave.maps import Alignment, RobotMap
 from mapweave_agent.planning import AgentParameters
 from mapweave_protocol.messages import AlignmentMessage, Compared, MapVersion
 from mapweave_protocol.pairs import ordered, responsible
@@ -34,6 +34,8 @@ class _Peer:
         Boot and version of the map it said to be its last.
     compared, published
         The versions compared last: by whomever, and by us.
+    found
+        What came of comparing them, by whomever.
     rests_until
         While it still maps, the pair is not compared before.
     """
@@ -44,6 +46,7 @@ class _Peer:
     last: tuple[str, int] | None = None
     compared: Compared | None = None
     published: Compared | None = None
+    found: Sequence[Alignment] = ()
     rests_until: float = 0.0
 
     def outdated(self, own: RobotMap | None) -> bool:
@@ -108,7 +111,8 @@ class ComparisonPlan:
         own, peer = versions.get(self._robot), versions.get(message.robot)
         if self._own is None or own is None or peer is None or own.boot != self._own.boot:
             return
-        self._peer(message.robot).compared = _versions(own, peer)
+        known = self._peer(message.robot)
+        known.compared, known.found = _versions(own, peer), message.unpack()
 
     def begin(self, now: float) -> Comparison | None:
         """Return the next comparison, None if none is due; of several, the one due longest."""
@@ -121,11 +125,23 @@ class ComparisonPlan:
         reference, other = ordered(own.robot, newest.robot)
         return Comparison(newest.robot, maps[reference], maps[other])
 
-    def done(self, comparison: Comparison, now: float, took: float) -> None:
-        """Note that `comparison` is done and published, and has taken `took` [s]."""
-        pair = comparison.reference, comparison.other
-        own, other = pair if pair[0].robot == self._robot else pair[::-1]
+    def found_before(self, comparison: Comparison) -> Sequence[Alignment]:
+        """Return what was found last of the two runs that `comparison` is of."""
+        _, other = self._sides(comparison)
         peer = self._peer(comparison.peer)
+        same_run = peer.compared is not None and peer.compared.peer_boot == other.boot
+        return peer.found if same_run else ()
+
+    def done(
+        self, comparison: Comparison, now: float, took: float, found: Sequence[Alignment] | None
+    ) -> None:
+        """Note that `comparison` has taken `took` [s], and what was `found` and published.
+
+        None where it failed: what was found before stands.
+        """
+        own, other = self._sides(comparison)
+        peer = self._peer(comparison.peer)
+        peer.found = self.found_before(comparison) if found is None else found
         peer.compared = peer.published = _versions(own, other)
         rest = max(self._parameters.comparison_interval, took * self._parameters.comparison_rest)
         peer.rests_until = now + rest
@@ -151,6 +167,11 @@ class ComparisonPlan:
         peer = self._peers[name]
         duty = responsible(self._robot, name) == self._robot or peer.gone
         return duty and peer.outdated(self._own)
+
+    def _sides(self, comparison: Comparison) -> tuple[RobotMap, RobotMap]:
+        """Return our map and the peer's."""
+        pair = comparison.reference, comparison.other
+        return pair if pair[0].robot == self._robot else pair[::-1]
 
     def _peer(self, name: str) -> _Peer:
         return self._peers.setdefault(name, _Peer())

@@ -1,8 +1,9 @@
-"""Confidence: fits its model on the pairs of `fusion`, and reports on buildings held out.
+"""Confidence: fits its models on the pairs of `fusion`, and reports on buildings held out.
 
 The model answers for the best hypothesis of a pair, so each pair counts once: its best hypothesis,
-accepted or not, and whether that was right within 0.5 m and 5°. Maps that are bent by more than
-that teach nothing, as no transform between them is right; they are reported on all the same.
+accepted or not, and whether that was right within 0.5 m and 5°. How much maps are bent is fitted to
+how far off the joins are, whose places were proven. Maps that are bent by more than 0.5 m in
+themselves teach nothing, as no transform between them is right; they are reported on all the same.
 """
 
 import argparse
@@ -18,6 +19,7 @@ from matplotlib.figure import Figure
 from mapweave.arrays import BoolArray, FloatArray
 from mapweave.confidence import ConfidenceParameters, features, share
 from mapweave.fusion import FusionParameters
+from mapweave.reach import ReachParameters, holds
 from mapweave.verification import Verdict
 from tests.benchmarks.fusion import ROWS
 from tests.benchmarks.logistic import (
@@ -28,6 +30,7 @@ from tests.benchmarks.logistic import (
     fit_logistic,
     reliability,
 )
+from tests.benchmarks.reach_fit import fit_reach
 from tests.benchmarks.tables import OUTPUT, format_table, write_json
 
 MAX_BEND = 0.5  # [m] rms of the maps that the model is fitted to
@@ -44,10 +47,16 @@ class Examples:
         (n, k) what the model looks at.
     share
         (n,) of the probability, left by the rival.
+    reach
+        (n,) how far the maps go on beyond what they share [m].
+    distance
+        (n,) how far off it is at the median over the map [m].
     right
         (n,)
     accepted
         (n,)
+    placed
+        (n,) whether it was accepted, or only the reach kept it from that: within one building.
     bend
         (n,) of the worse map of the two [m].
     buildings
@@ -56,8 +65,11 @@ class Examples:
 
     features: FloatArray
     share: FloatArray
+    reach: FloatArray
+    distance: FloatArray
     right: BoolArray
     accepted: BoolArray
+    placed: BoolArray
     bend: FloatArray
     buildings: list[tuple[str, str]]
 
@@ -83,7 +95,7 @@ def run(options: argparse.Namespace) -> None:
     """Report on held-out buildings, then fit on all and print what to paste."""
     examples = read_examples(options.rows)
     held_out = predict_held_out(examples)
-    present = _present_model().predict(examples.features) * examples.share
+    present = _said(examples, _present_model(), ReachParameters())
     for name, said in (("present coefficients", present), ("fitted, held out", held_out)):
         print(tell(name, said, examples))
     bins = reliability(held_out, examples.right)
@@ -91,10 +103,13 @@ def run(options: argparse.Namespace) -> None:
     _draw(bins).savefig(options.output)
     fitted = _fit(examples, examples.sound)
     coefficients = dict(zip(["intercept", *NAMES], [fitted.intercept, *fitted.slopes], strict=True))
+    bent = _fit_reach(examples, examples.sound)
+    coefficients |= {"exact": bent.exact, "bend": bent.bend}
     write_json(options.output.with_suffix(".json"), coefficients)
-    print("Fitted to all pairs, for ConfidenceParameters:")
+    print("Fitted to all pairs, for ConfidenceParameters and ReachParameters:")
     for name, value in coefficients.items():
         print(f"    {name}: {value:.3g}")
+    print(_tell_bends(examples))
     print(f"Reliability is drawn as {options.output}")
 
 
@@ -105,11 +120,24 @@ def read_examples(file: Path) -> Examples:
     return Examples(
         np.array([features(best) for best, _ in verdicts]),
         np.array([share(*pair, ConfidenceParameters()) for pair in verdicts]),
+        np.array([_number(row["evidence"].get("reach")) for row in rows]),
+        np.array([_number(row["distance"]) for row in rows]),
         np.array([row["right"] for row in rows], dtype=np.bool_),
         np.array([row["decision"] == "accepted" for row in rows], dtype=np.bool_),
+        np.array([_is_placed(row) for row in rows], dtype=np.bool_),
         np.array([max(row["bends"]) for row in rows]),
         [(row["buildings"][0], row["buildings"][1]) for row in rows],
     )
+
+
+def _number(value: float | None) -> float:
+    """Infinite where there is none: nothing is shared, or buildings differ."""
+    return np.inf if value is None else value
+
+
+def _is_placed(row: dict[str, Any]) -> bool:
+    proven = row["decision"] == "accepted" or "place" in row["evidence"]
+    return proven and row["buildings"][0] == row["buildings"][1]
 
 
 def _verdicts(row: dict[str, Any]) -> tuple[Verdict, Verdict | None]:
@@ -133,12 +161,39 @@ def predict_held_out(examples: Examples) -> FloatArray:
         asked = np.array([each == pair for each in examples.buildings])
         seen = ~(examples.touches(pair[0]) | examples.touches(pair[1]))
         model = _fit(examples, seen & examples.sound)
-        said[asked] = model.predict(examples.features[asked])
-    return said * examples.share
+        bent = _fit_reach(examples, seen & examples.sound)
+        said[asked] = _said(examples, model, bent)[asked]
+    return said
 
 
 def _fit(examples: Examples, chosen: BoolArray) -> Logistic:
     return fit_logistic(examples.features[chosen], examples.right[chosen])
+
+
+def _fit_reach(examples: Examples, chosen: BoolArray) -> ReachParameters:
+    joins = chosen & examples.placed
+    if not joins.any():
+        return ReachParameters()
+    exact, bend = fit_reach(examples.reach[joins], examples.distance[joins])
+    return ReachParameters(exact=exact, bend=bend)
+
+
+def _said(examples: Examples, model: Logistic, bent: ReachParameters) -> FloatArray:
+    """Return the (n,) confidences."""
+    held = np.array([holds(far, bent) for far in examples.reach])
+    return np.asarray(model.predict(examples.features) * examples.share * held)
+
+
+def _tell_bends(examples: Examples) -> str:
+    """Return how much the maps of each building are bent, as text."""
+    rows = []
+    for building in sorted({pair[0] for pair in examples.buildings}):
+        inside = np.array([pair == (building, building) for pair in examples.buildings])
+        joins = inside & examples.placed
+        if joins.any():
+            bent = _fit_reach(examples, inside)
+            rows.append([building, str(joins.sum()), f"{bent.exact:.3f}", f"{bent.bend:.4f}"])
+    return format_table(["building", "joins", "exact [m]", "bend"], rows)
 
 
 def _present_model() -> Logistic:

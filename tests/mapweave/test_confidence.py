@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapweave.confidence import ConfidenceParameters, confidence, features, share
-from mapweave.fusion import FusionParameters
+from mapweave.decision import DecisionParameters
 from mapweave.verification import Verdict
 
 P = ConfidenceParameters()
@@ -66,6 +66,6 @@ def test_the_odds_between_two_depend_on_the_ratio_of_their_scores() -> None:
 
 
 def test_a_rival_that_leaves_an_alignment_accepted_costs_it_little() -> None:
-    most = FusionParameters().max_rival
+    most = DecisionParameters().max_rival
     assert share(verdict(20), verdict(20 * most), P) > 0.99
     assert share(verdict(20), None, P) == share(verdict(20), verdict(1, 9), P) == 1

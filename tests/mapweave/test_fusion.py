@@ -9,7 +9,8 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place
-from mapweave.fusion import FusionParameters, Hypothesis, align_maps, align_robots, decide
+from mapweave.decision import DecisionParameters, Hypothesis, decide
+from mapweave.fusion import FusionParameters, align_maps, align_robots
 from mapweave.hypotheses import HypothesisParameters
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave.raster_alignment import RasterAlignmentParameters
@@ -188,9 +189,8 @@ def test_exchanging_the_maps_inverts_the_transform() -> None:
 
 def test_evidence_and_runner_up_are_plain_finite_numbers() -> None:
     found, _ = compared(LEFT, RIGHT, 1)
-    assert {"common", "contradicted", "overlap", "residual", "held", "complexity", "score"} == set(
-        found.evidence
-    )
+    names = "common contradicted overlap residual held complexity score reach"
+    assert set(names.split()) == set(found.evidence)
     assert np.isfinite(list(found.evidence.values())).all()
     assert found.evidence["score"] == pytest.approx(
         found.evidence["common"]
@@ -267,6 +267,6 @@ def test_the_best_leads_by_metres_and_by_its_share(
         verdict = Verdict(score, 0.0, 1.0, 0.02, 9.0, 5.0)
         return Hypothesis(np.array([x, 0.0, 0.0]), np.array([x, 0.0]), verdict, 0.5)
 
-    found, reason = decide(hypothesis(best, 0), hypothesis(rival, 9), 0.95, FusionParameters())
+    found, reason = decide(hypothesis(best, 0), hypothesis(rival, 9), 0.95, DecisionParameters())
     assert found == decision
     assert ("fits as well" in reason) == (rival > best / 2)

@@ -171,7 +171,7 @@ def test_where_track_was_lost_less_proof_is_asked_for_than_anywhere(
     def refuse(
         a: str, _: object, b: str, __: object, p: FusionParameters, possible: object = None
     ) -> Alignment:
-        asked.append((possible is not None, p.min_confidence, p.min_lead))
+        asked.append((possible is not None, p.decision.min_confidence, p.decision.min_lead))
         return Alignment(a, b, np.zeros(3), "ambiguous", 0.0, "so")
 
     monkeypatch.setattr("mapweave.reunion.compare", refuse)

@@ -1,0 +1,78 @@
+"""Reach: how far two maps go on beyond the wall that they share, and what that leaves of a join.
+
+Where both looked an alignment is exact. Maps are bent, though: what lies beyond is off by a part of
+the way there, so an alignment of the right places may be wrong for maps as wholes.
+"""
+
+import math
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from scipy.spatial import KDTree
+
+from mapweave import se2
+from mapweave.arrays import FloatArray
+from mapweave.map_raster import MapRaster
+from mapweave.verification import VerificationParameters, coinciding
+
+
+class ReachParameters(BaseModel):
+    """How much maps are bent.
+
+    Most likely for the joins between stretches of the Freiburg, Intel, CSAIL and Seattle logs.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    tolerance: float = Field(
+        0.5, gt=0, description="[m] by which a map may be off at the median, to be joined right"
+    )
+    exact: float = Field(
+        0.055, gt=0, description="[m] standard deviation along x and y, where both looked"
+    )
+    bend: float = Field(
+        0.0115,
+        gt=0,
+        description="the same for each metre beyond: a map whose middle is 20 m from there is off"
+        " by 0.27 m at the median",
+    )
+
+
+def reach(
+    first: MapRaster, second: MapRaster, transform: FloatArray, parameters: VerificationParameters
+) -> float:
+    """Return how far the two maps go on beyond the wall that they share [m].
+
+    For each map the median, over its wall, of the distance to the nearest wall in common; together
+    the root of the sum of their squares, as bends of two maps add up. Infinite where nothing is
+    shared.
+
+    Parameters
+    ----------
+    transform
+        (3,) from `second` to `first`.
+    """
+    ways = (first, second, transform), (second, first, se2.inverse(transform))
+    return math.hypot(*(_beyond(*way, parameters) for way in ways))
+
+
+def _beyond(
+    reference: MapRaster, other: MapRaster, transform: FloatArray, p: VerificationParameters
+) -> float:
+    """[m] median distance of the wall of `other` from that of it which coincides."""
+    shared = coinciding(reference, other, transform, p)
+    if not shared.any():
+        return math.inf
+    points = other.surface.points
+    distance, _ = KDTree(points[shared]).query(points)
+    return float(np.median(distance))
+
+
+def holds(reach: float, parameters: ReachParameters) -> float:
+    """Return the probability that maps that reach this far [m] are within the tolerance.
+
+    What they are off by is taken to be normal, along x as along y.
+    """
+    p = parameters
+    spread = math.hypot(p.exact, p.bend * reach)
+    return -math.expm1(-(p.tolerance**2) / (2 * spread**2))

@@ -1,0 +1,41 @@
+"""How much maps are bent, as the joins of stretches tell: most likely parameters of `reach`."""
+
+import numpy as np
+from scipy.optimize import minimize
+
+from mapweave.arrays import FloatArray
+from tests.benchmarks.logistic import MISTAKEN
+
+ANYWHERE = 10.0  # [m] standard deviation along x and y of a mistaken outcome
+START = (0.05, 0.01)
+
+
+def fit_reach(reach: FloatArray, distance: FloatArray) -> tuple[float, float]:
+    """Return (exact, bend) of `ReachParameters`.
+
+    Errors are normal along x and along y, so their size is of Rayleigh's distribution; its scale
+    grows with the reach. A few are mistaken and tell nothing, as the poses are that they are
+    measured against.
+
+    Parameters
+    ----------
+    reach
+        (n,) how far the maps go on beyond what they share [m].
+    distance
+        (n,) how far off each join is at the median over the map [m].
+    """
+
+    def loss(logs: FloatArray) -> float:
+        exact, bend = np.exp(logs)
+        usual = _rayleigh(distance, np.hypot(exact, bend * reach))
+        odd = _rayleigh(distance, np.full(len(distance), ANYWHERE))
+        return -float(np.log((1 - MISTAKEN) * usual + MISTAKEN * odd).sum())
+
+    found = minimize(loss, np.log(START), method="Nelder-Mead").x
+    exact, bend = np.exp(found)
+    return float(exact), float(bend)
+
+
+def _rayleigh(distance: FloatArray, scale: FloatArray) -> FloatArray:
+    squared = scale**2
+    return np.asarray(distance / squared * np.exp(-(distance**2) / (2 * squared)))
