@@ -111,7 +111,9 @@ class _Graph:
     def _edge(self, link: Alignment) -> Edge:
         first, second = self._number[link.reference], self._number[link.other]
         there = se2.compose(link.transform, self._middles[second])
-        return Edge(first, second, se2.between(self._middles[first], there), link.confidence)
+        # What is asked here is whether the places are right; how far maps bend is another matter.
+        sure = link.evidence.get("place", link.confidence)
+        return Edge(first, second, se2.between(self._middles[first], there), sure)
 
     def clusters(self) -> list[Cluster]:
         """Return the clusters, in the order of their first components."""

@@ -95,20 +95,21 @@ def _for_wholes(
 ) -> Alignment:
     """Return `found` with the confidence that it is right for the maps as wholes, which are bent.
 
-    Where only that keeps them apart its evidence tells how sure the `place` is.
+    Where the place was proven, its evidence tells how sure that is.
     """
     if first is None or second is None or not found.evidence:
         return found
     far = reach(first.raster, second.raster, found.transform, p.verification)
     sure = found.confidence * holds(far, p.reach)
     evidence = {**found.evidence, "reach": far}
+    if found.decision == "accepted":
+        evidence["place"] = found.confidence
     if found.decision != "accepted" or sure >= p.decision.min_confidence:
         return replace(found, confidence=sure, evidence=evidence)
     reason = (
         f"{found.reason}; but from there the maps go on for {far:.0f} m, where they may be bent"
         f" by more than {p.reach.tolerance:g} m: right as a whole with {percent(sure)} only"
     )
-    evidence["place"] = found.confidence
     return replace(found, decision="ambiguous", confidence=sure, reason=reason, evidence=evidence)
 
 

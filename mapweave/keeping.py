@@ -29,7 +29,7 @@ def keep_joined(
 
 
 def _same_place(alignment: Alignment) -> bool:
-    """Whether what was compared proves the place, and only the maps' reach leaves it open."""
+    """Whether what was compared proves the `place`, and only the maps' reach leaves it open."""
     return alignment.decision == "ambiguous" and "place" in alignment.evidence
 
 

@@ -136,8 +136,7 @@ def _number(value: float | None) -> float:
 
 
 def _is_placed(row: dict[str, Any]) -> bool:
-    proven = row["decision"] == "accepted" or "place" in row["evidence"]
-    return proven and row["buildings"][0] == row["buildings"][1]
+    return "place" in row["evidence"] and row["buildings"][0] == row["buildings"][1]
 
 
 def _verdicts(row: dict[str, Any]) -> tuple[Verdict, Verdict | None]:

@@ -66,6 +66,21 @@ def test_a_cluster_is_as_sure_as_the_weakest_link_it_needs() -> None:
     assert clusters[0].confidence == pytest.approx(0.95)
 
 
+def test_a_link_counts_as_its_place_is_sure_whatever_the_maps_are_bent_by() -> None:
+    bent = replace(CHAIN[0], confidence=0.3, evidence={"place": 0.9})
+    (cluster,), judged = cluster_components(NAMES[:3], [bent, CHAIN[1]], P)
+    (same,), _ = cluster_components(NAMES[:3], CHAIN[:2], P)
+    assert cluster.confidence == same.confidence
+    assert judged[0].confidence == 0.3
+
+
+@pytest.mark.parametrize("place", [-1e9, 0.0, 1e9])
+def test_a_place_that_is_no_probability_breaks_nothing(place: float) -> None:
+    odd = replace(CHAIN[0], evidence={"place": place})
+    (cluster,), _ = cluster_components(NAMES[:2], [odd], P)
+    assert 0 <= cluster.confidence <= 1
+
+
 def test_components_without_an_accepted_link_stay_alone_and_sure() -> None:
     links = [link("a/0", "b/0"), link("a/0", "c/0", decision="ambiguous"),
              link("a/0", "d/0", decision="refused")]  # fmt: skip

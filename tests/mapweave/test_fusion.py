@@ -189,7 +189,7 @@ def test_exchanging_the_maps_inverts_the_transform() -> None:
 
 def test_evidence_and_runner_up_are_plain_finite_numbers() -> None:
     found, _ = compared(LEFT, RIGHT, 1)
-    names = "common contradicted overlap residual held complexity score reach"
+    names = "common contradicted overlap residual held complexity score reach place"
     assert set(names.split()) == set(found.evidence)
     assert np.isfinite(list(found.evidence.values())).all()
     assert found.evidence["score"] == pytest.approx(
