@@ -20,6 +20,7 @@ from mapweave.explanations import ExplanationParameters, bits, explain
 from mapweave.map_raster import MapRaster
 from mapweave.maps import Alignment
 from mapweave.pose_graph import Link, optimise
+from mapweave.reach import ReachParameters, slack
 from mapweave.reliance import component_confidence, part_right, rely
 
 SET_ASIDE = "set aside: "  # begins the reason of an accepted alignment that is not relied on
@@ -33,6 +34,7 @@ class GraphParameters(BaseModel):
 
     explanations: ExplanationParameters = ExplanationParameters()
     doubts: DoubtParameters = DoubtParameters()
+    reach: ReachParameters = ReachParameters()
     sigma: float = Field(0.1, gt=0, description="[m] of an alignment's translation")
     turn_sigma: float = Field(0.01, gt=0, description="[rad] of an alignment's rotation")
 
@@ -101,6 +103,7 @@ class _Graph:
         links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
         self._edge_of = {id(link): k for k, link in enumerate(links)}
         self._edges = [self._edge(link) for link in links]
+        self._sure = [link.confidence for link in links]
         seen = {self._number[name]: raster for name, raster in rasters.items()}
         witnesses = MapWitnesses(seen, self._middles, parameters.doubts)
         self._doubts = MapDoubts(len(names), self._edges, witnesses)
@@ -111,17 +114,19 @@ class _Graph:
     def _edge(self, link: Alignment) -> Edge:
         first, second = self._number[link.reference], self._number[link.other]
         there = se2.compose(link.transform, self._middles[second])
-        # What is asked here is whether the places are right; how far maps bend is another matter.
-        sure = link.evidence.get("place", link.confidence)
-        return Edge(first, second, se2.between(self._middles[first], there), sure)
+        # What is asked first is whether the places are right; that maps are bent is no objection.
+        place = link.evidence.get("place", link.confidence)
+        bent = slack(link.evidence.get("reach", 0.0), self._parameters.reach)
+        return Edge(first, second, se2.between(self._middles[first], there), place, bent)
 
     def clusters(self) -> list[Cluster]:
         """Return the clusters, in the order of their first components."""
         count, p = len(self._names), self._parameters.explanations
+        whole = [replace(e, confidence=c) for e, c in zip(self._edges, self._sure, strict=True)]
         return [
             Cluster(
                 self._poses(group),
-                component_confidence(group, count, self._edges, self._right, self._explanations, p),
+                component_confidence(group, count, whole, self._right, self._explanations, p),
             )
             for group in groups(count, self._edges, self._right)
         ]

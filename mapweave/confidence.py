@@ -1,5 +1,6 @@
-"""Confidence: the probability that an alignment is right within 0.5 m and 5°.
+"""Confidence: the probability that an alignment is right within 0.5 m and 5°, where both maps looked.
 
+What maps are bent by elsewhere is a matter of their reach (`reach`).
 A logistic model of a few numbers of the evidence, fitted offline by
 ``tests/benchmarks/fit_confidence.py``, says how probably the evidence comes from one place seen
 twice. Where a different transform has evidence of its own, that probability is shared between the
@@ -45,7 +46,7 @@ def share(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters
 
 
 def confidence(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
-    """Return the probability that the best hypothesis is right, in (0, 1)."""
+    """Return the probability that the best hypothesis has the right place, in (0, 1)."""
     p = parameters
     slopes = np.array([p.score, p.held])
     either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best))))

@@ -38,12 +38,15 @@ class Edge:
         (3,) of the second in the frame of the first [m, m, rad].
     confidence
         That it is right, before others are asked.
+    slack
+        [m] by which bent maps may add to what it errs by.
     """
 
     first: int
     second: int
     transform: FloatArray
     confidence: float
+    slack: float = 0.0
 
 
 def bad_cycles(count: int, edges: Sequence[Edge], removed: int, p: CycleParameters) -> list[int]:
@@ -116,7 +119,13 @@ def bad_cycles_through(
     second = poses[[edges[k].second for k in closing]]
     off = misfit(transforms, first, second)
     # Errors of independent alignments add up as their squares do.
-    slack = np.sqrt([masks[k].bit_count() / 3 for k in closing])
-    bad = np.hypot(off[:, 0], off[:, 1]) > p.max_distance * slack
-    bad |= np.abs(off[:, 2]) > p.max_turn * slack
+    length = np.array([masks[k].bit_count() / 3 for k in closing])
+    bent = np.array([_bent(edges, masks[k]) for k in closing])
+    bad = np.sum(off[:, :2] ** 2, axis=1) > p.max_distance**2 * length + bent
+    bad |= np.abs(off[:, 2]) > p.max_turn * np.sqrt(length)
     return [masks[k] for k, is_bad in zip(closing, bad, strict=True) if is_bad]
+
+
+def _bent(edges: Sequence[Edge], mask: int) -> float:
+    """[m²] that bends may add to what the cycle of the edges in `mask` misses by, squared."""
+    return sum(edge.slack**2 for k, edge in enumerate(edges) if mask >> k & 1)

@@ -141,6 +141,8 @@ def compare(
 ) -> Alignment:
     """Find the transform from `second`, called `b`, to `first`, called `a`, both prepared.
 
+    Decision and confidence are of the place: what maps are bent by elsewhere is not asked.
+
     Parameters
     ----------
     possible

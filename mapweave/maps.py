@@ -150,7 +150,7 @@ class Alignment:
     decision
         Accepted, ambiguous or refused.
     confidence
-        Probability that the transform is right within 0.5 m and 5°.
+        Probability that the transform is right within 0.5 m and 5°, at the median over the map.
     reason
         One sentence for a person.
     evidence

@@ -34,8 +34,9 @@ class ReachParameters(BaseModel):
         0.0115,
         gt=0,
         description="the same for each metre beyond: a map whose middle is 20 m from there is off"
-        " by 0.27 m at the median",
+        " by 0.28 m at the median",
     )
+    most: float = Field(60.0, gt=0, description="[m] of reach that others allow for in cycles")
 
 
 def reach(
@@ -71,8 +72,18 @@ def _beyond(
 def holds(reach: float, parameters: ReachParameters) -> float:
     """Return the probability that maps that reach this far [m] are within the tolerance.
 
-    What they are off by is taken to be normal, along x as along y.
+    What they are off by is taken to be normal, along x as along y; they turn by less than 5° before
+    that.
     """
     p = parameters
     spread = math.hypot(p.exact, p.bend * reach)
     return -math.expm1(-(p.tolerance**2) / (2 * spread**2))
+
+
+def slack(reach: float, parameters: ReachParameters) -> float:
+    """Return by how much [m] maps that reach this far may be off elsewhere: in 19 cases of 20.
+
+    What others say of the reach is bounded, for what may be off by any amount is never refuted.
+    """
+    p = parameters
+    return 2.45 * p.bend * min(max(reach, 0.0), p.most)

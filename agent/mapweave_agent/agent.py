@@ -153,14 +153,16 @@ class Agent:
             if comparison is not None:
                 self._comparer.start(comparison)
 
-    def _publish_outcome(self, outcome: Outcome) -> Sequence[Alignment] | None:
-        """Return what was published, None where comparing failed."""
+    def _publish_outcome(self, outcome: Outcome) -> Sequence[Alignment]:
+        """Return what was published: nothing where comparing failed."""
         comparison = outcome.comparison
         if outcome.alignments is None:
             # What was found out about earlier versions of the pair stands.
             _log.error("comparing with %s failed: %s", comparison.peer, outcome.failure)
-            return None
-        found = keep_joined(outcome.alignments, self._comparisons.found_before(comparison))
+            return ()
+        found = outcome.alignments
+        if self._comparisons.have_met(comparison):
+            found = keep_joined(found)
         message = AlignmentMessage.pack(
             self._mapper.robot,
             MapVersion.of(comparison.reference),

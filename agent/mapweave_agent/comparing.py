@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from mapweave.keeping import joins
 from mapweave.maps import Alignment, RobotMap
 from mapweave_agent.planning import AgentParameters
 from mapweave_protocol.messages import AlignmentMessage, Compared, MapVersion
@@ -34,8 +35,8 @@ class _Peer:
         Boot and version of the map it said to be its last.
     compared, published
         The versions compared last: by whomever, and by us.
-    found
-        What came of comparing them, by whomever.
+    met
+        The runs of it whose map was joined with ours, by whomever.
     rests_until
         While it still maps, the pair is not compared before.
     """
@@ -46,7 +47,7 @@ class _Peer:
     last: tuple[str, int] | None = None
     compared: Compared | None = None
     published: Compared | None = None
-    found: Sequence[Alignment] = ()
+    met: set[str] = field(default_factory=set)
     rests_until: float = 0.0
 
     def outdated(self, own: RobotMap | None) -> bool:
@@ -111,8 +112,8 @@ class ComparisonPlan:
         own, peer = versions.get(self._robot), versions.get(message.robot)
         if self._own is None or own is None or peer is None or own.boot != self._own.boot:
             return
-        known = self._peer(message.robot)
-        known.compared, known.found = _versions(own, peer), message.unpack()
+        self._peer(message.robot).compared = _versions(own, peer)
+        self._note_meeting(message.robot, peer.boot, message.unpack())
 
     def begin(self, now: float) -> Comparison | None:
         """Return the next comparison, None if none is due; of several, the one due longest."""
@@ -125,23 +126,18 @@ class ComparisonPlan:
         reference, other = ordered(own.robot, newest.robot)
         return Comparison(newest.robot, maps[reference], maps[other])
 
-    def found_before(self, comparison: Comparison) -> Sequence[Alignment]:
-        """Return what was found last of the two runs that `comparison` is of."""
+    def have_met(self, comparison: Comparison) -> bool:
+        """Tell whether the two runs that `comparison` is of were joined once."""
         _, other = self._sides(comparison)
-        peer = self._peer(comparison.peer)
-        same_run = peer.compared is not None and peer.compared.peer_boot == other.boot
-        return peer.found if same_run else ()
+        return other.boot in self._peer(comparison.peer).met
 
     def done(
-        self, comparison: Comparison, now: float, took: float, found: Sequence[Alignment] | None
+        self, comparison: Comparison, now: float, took: float, found: Sequence[Alignment] = ()
     ) -> None:
-        """Note that `comparison` has taken `took` [s], and what was `found` and published.
-
-        None where it failed: what was found before stands.
-        """
+        """Note that `comparison` has taken `took` [s], and what was `found` and published."""
         own, other = self._sides(comparison)
         peer = self._peer(comparison.peer)
-        peer.found = self.found_before(comparison) if found is None else found
+        self._note_meeting(comparison.peer, other.boot, found)
         peer.compared = peer.published = _versions(own, other)
         rest = max(self._parameters.comparison_interval, took * self._parameters.comparison_rest)
         peer.rests_until = now + rest
@@ -167,6 +163,10 @@ class ComparisonPlan:
         peer = self._peers[name]
         duty = responsible(self._robot, name) == self._robot or peer.gone
         return duty and peer.outdated(self._own)
+
+    def _note_meeting(self, peer: str, boot: str, found: Sequence[Alignment]) -> None:
+        if joins(found):
+            self._peer(peer).met.add(boot)
 
     def _sides(self, comparison: Comparison) -> tuple[RobotMap, RobotMap]:
         """Return our map and the peer's."""

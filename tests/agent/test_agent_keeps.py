@@ -50,7 +50,7 @@ def test_a_join_is_kept_when_the_map_of_a_peer_has_grown(
     assert joined is not None and kept is not None
     assert joined.decision == "accepted" and joined.confidence > 0.85
     assert kept.decision == "accepted" and kept.confidence < 0.5
-    assert kept.reason.startswith("joined before; ")
+    assert kept.reason.startswith("the robots met before; ")
 
 
 def _compares(listener: Listener, peer: RobotMap) -> bool:

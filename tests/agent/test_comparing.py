@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapweave.maps import Alignment, RobotMap
+from mapweave.maps import Alignment, Decision, RobotMap
 from mapweave_agent.comparing import Comparison, ComparisonPlan
 from mapweave_agent.planning import AgentParameters, PublicationPlan
 from mapweave_protocol.messages import AlignmentMessage, Compared, MapVersion
@@ -29,13 +29,13 @@ def plan_of(robot: str, peer: str) -> ComparisonPlan:
     return plan
 
 
-def found(comparison: Comparison, author: str) -> AlignmentMessage:
+def alignment(decision: Decision) -> Alignment:
+    return Alignment("a/0", "b/0", np.zeros(3), decision, 0.5, "so")
+
+
+def found(comparison: Comparison, author: str, *alignments: Alignment) -> AlignmentMessage:
     versions = MapVersion.of(comparison.reference), MapVersion.of(comparison.other)
-    return AlignmentMessage.pack(author, *versions, [alignment(0.875)])
-
-
-def alignment(confidence: float) -> Alignment:
-    return Alignment("a/0", "b/0", np.zeros(3), "accepted", confidence, "so")
+    return AlignmentMessage.pack(author, *versions, alignments)
 
 
 def test_of_two_only_the_responsible_one_compares() -> None:
@@ -87,50 +87,53 @@ def test_the_same_versions_are_compared_once() -> None:
     plan = plan_of(FIRST, SECOND)
     comparison = plan.begin(0.0)
     assert comparison is not None
-    plan.done(comparison, 1.0, 1.0, found=[])
+    plan.done(comparison, 1.0, 1.0)
     assert plan.begin(1e9) is None
     assert plan.idle
     assert plan.published == {SECOND: Compared(own_version=1, peer_boot="x", peer_version=1)}
 
 
-def test_what_was_found_before_is_known_whoever_found_it() -> None:
+def test_robots_that_were_joined_once_have_met_whoever_found_it() -> None:
     for robot, peer in ((FIRST, SECOND), (SECOND, FIRST)):
-        plan = plan_of(robot, peer)
-        plan.peer_gone(peer, "x")
-        comparison = plan.begin(0.0)
-        assert comparison is not None
-        assert list(plan.found_before(comparison)) == []
-        plan.learned(found(comparison, peer))
-        assert [a.confidence for a in plan.found_before(comparison)] == [0.875]
-        plan.done(comparison, 1.0, 1.0, found=[alignment(0.5)])
-        assert [a.confidence for a in plan.found_before(comparison)] == [0.5]
+        for learns in (True, False):
+            plan = plan_of(robot, peer)
+            plan.peer_gone(peer, "x")
+            comparison = plan.begin(0.0)
+            assert comparison is not None
+            assert not plan.have_met(comparison)
+            if learns:
+                plan.learned(found(comparison, peer, alignment("accepted")))
+            else:
+                plan.done(comparison, 1.0, 1.0, [alignment("accepted")])
+            plan.done(comparison, 2.0, 1.0, [alignment("refused")])
+            assert plan.have_met(comparison)
 
 
-def test_what_failed_leaves_what_was_found_before() -> None:
+def test_robots_that_were_not_joined_have_not_met() -> None:
     plan = plan_of(FIRST, SECOND)
     comparison = plan.begin(0.0)
     assert comparison is not None
-    plan.done(comparison, 1.0, 1.0, found=[alignment(0.5)])
-    plan.done(comparison, 2.0, 1.0, found=None)
-    assert [a.confidence for a in plan.found_before(comparison)] == [0.5]
+    plan.done(comparison, 1.0, 1.0, [alignment("ambiguous"), alignment("refused")])
+    plan.done(comparison, 1.0, 1.0)
+    assert not plan.have_met(comparison)
 
 
-def test_what_was_found_of_another_run_says_nothing_of_this_one() -> None:
+def test_who_met_another_run_of_a_robot_has_not_met_this_one() -> None:
     plan = plan_of(FIRST, SECOND)
     comparison = plan.begin(0.0)
     assert comparison is not None
-    plan.done(comparison, 1.0, 1.0, found=[alignment(0.5)])
+    plan.done(comparison, 1.0, 1.0, [alignment("accepted")])
     plan.peer_map(a_map(SECOND, 1, boot="y"))
     anew = plan.begin(1e9)
     assert anew is not None
-    assert list(plan.found_before(anew)) == []
+    assert not plan.have_met(anew)
 
 
 def test_while_robots_map_a_pair_rests_between_comparisons() -> None:
     plan = plan_of(FIRST, SECOND)
     comparison = plan.begin(0.0)
     assert comparison is not None
-    plan.done(comparison, now=10.0, took=4.0, found=[])
+    plan.done(comparison, now=10.0, took=4.0)
     plan.own_map(a_map(FIRST, 2), finished=False)
     assert plan.begin(17.9) is None
     assert not plan.idle
@@ -141,7 +144,7 @@ def test_the_last_maps_are_compared_at_once() -> None:
     plan = plan_of(FIRST, SECOND)
     comparison = plan.begin(0.0)
     assert comparison is not None
-    plan.done(comparison, now=1.0, took=1.0, found=[])
+    plan.done(comparison, now=1.0, took=1.0)
     plan.own_map(a_map(FIRST, 9), finished=True)
     plan.peer_map(a_map(SECOND, 7))
     assert plan.begin(1.0) is None
@@ -155,7 +158,7 @@ def test_the_map_of_another_run_is_compared_anew() -> None:
     plan = plan_of(FIRST, SECOND)
     comparison = plan.begin(0.0)
     assert comparison is not None
-    plan.done(comparison, 1.0, 1.0, found=[])
+    plan.done(comparison, 1.0, 1.0)
     plan.peer_map(a_map(SECOND, 1, boot="y"))
     assert plan.begin(1e9) is not None
 
@@ -172,7 +175,7 @@ def test_pairs_take_turns() -> None:
         plan.own_map(a_map("a", turn + 1), finished=False)
         comparison = plan.begin(100.0 * turn)
         assert comparison is not None
-        plan.done(comparison, 100.0 * turn, 1.0, found=[])
+        plan.done(comparison, 100.0 * turn, 1.0)
         compared.append(comparison.peer)
     assert sorted(compared) == sorted(2 * duties)
 
@@ -224,7 +227,7 @@ def test_in_the_end_the_last_maps_were_compared_by_the_responsible_one_alone(
 def work(side: Side, now: float) -> None:
     """Finish the comparison under way, or begin one."""
     if side.under_way is not None:
-        side.plan.done(side.under_way, now, 1.0, found=[])
+        side.plan.done(side.under_way, now, 1.0)
         side.results.append(side.under_way)
         side.under_way = None
     else:

@@ -1,9 +1,11 @@
 """Confidence: fits its models on the pairs of `fusion`, and reports on buildings held out.
 
 The model answers for the best hypothesis of a pair, so each pair counts once: its best hypothesis,
-accepted or not, and whether that was right within 0.5 m and 5°. How much maps are bent is fitted to
-how far off the joins are, whose places were proven. Maps that are bent by more than 0.5 m in
-themselves teach nothing, as no transform between them is right; they are reported on all the same.
+accepted or not, and whether that was right within 0.5 m and 5°. Two models answer: one whether the
+place is right, the other whether maps, which are bent, are right as wholes there. The first is
+fitted to places, where what maps may be bent by is allowed for, the second to how far off the joins
+are. Maps that are bent by more than 0.5 m in themselves teach nothing of places; they are reported
+on all the same.
 """
 
 import argparse
@@ -30,10 +32,12 @@ from tests.benchmarks.logistic import (
     fit_logistic,
     reliability,
 )
+from tests.benchmarks.pairs import RIGHT_DISTANCE, RIGHT_TURN
 from tests.benchmarks.reach_fit import fit_reach
 from tests.benchmarks.tables import OUTPUT, format_table, write_json
 
 MAX_BEND = 0.5  # [m] rms of the maps that the model is fitted to
+MOST_BENT = 0.07  # [m] off for each metre of reach that a right place may be
 NAMES = ("score", "held")  # of the slopes, as in `features`
 
 
@@ -53,6 +57,8 @@ class Examples:
         (n,) how far off it is at the median over the map [m].
     right
         (n,)
+    right_place
+        (n,) the same, but for what the maps may be bent by.
     accepted
         (n,)
     placed
@@ -68,6 +74,7 @@ class Examples:
     reach: FloatArray
     distance: FloatArray
     right: BoolArray
+    right_place: BoolArray
     accepted: BoolArray
     placed: BoolArray
     bend: FloatArray
@@ -103,7 +110,7 @@ def run(options: argparse.Namespace) -> None:
     _draw(bins).savefig(options.output)
     fitted = _fit(examples, examples.sound)
     coefficients = dict(zip(["intercept", *NAMES], [fitted.intercept, *fitted.slopes], strict=True))
-    bent = _fit_reach(examples, examples.sound)
+    bent = _fit_reach(examples, examples.placed)
     coefficients |= {"exact": bent.exact, "bend": bent.bend}
     write_json(options.output.with_suffix(".json"), coefficients)
     print("Fitted to all pairs, for ConfidenceParameters and ReachParameters:")
@@ -123,6 +130,7 @@ def read_examples(file: Path) -> Examples:
         np.array([_number(row["evidence"].get("reach")) for row in rows]),
         np.array([_number(row["distance"]) for row in rows]),
         np.array([row["right"] for row in rows], dtype=np.bool_),
+        np.array([_is_right_place(row) for row in rows], dtype=np.bool_),
         np.array([row["decision"] == "accepted" for row in rows], dtype=np.bool_),
         np.array([_is_placed(row) for row in rows], dtype=np.bool_),
         np.array([max(row["bends"]) for row in rows]),
@@ -133,6 +141,15 @@ def read_examples(file: Path) -> Examples:
 def _number(value: float | None) -> float:
     """Infinite where there is none: nothing is shared, or buildings differ."""
     return np.inf if value is None else value
+
+
+def _is_right_place(row: dict[str, Any]) -> bool:
+    far = _number(row["evidence"].get("reach"))
+    bent = MOST_BENT * far if np.isfinite(far) else 0.0
+    turned: float = row["turn"]
+    return row["right"] or (
+        turned <= RIGHT_TURN and _number(row["distance"]) <= RIGHT_DISTANCE + bent
+    )
 
 
 def _is_placed(row: dict[str, Any]) -> bool:
@@ -160,17 +177,17 @@ def predict_held_out(examples: Examples) -> FloatArray:
         asked = np.array([each == pair for each in examples.buildings])
         seen = ~(examples.touches(pair[0]) | examples.touches(pair[1]))
         model = _fit(examples, seen & examples.sound)
-        bent = _fit_reach(examples, seen & examples.sound)
+        bent = _fit_reach(examples, seen)
         said[asked] = _said(examples, model, bent)[asked]
     return said
 
 
 def _fit(examples: Examples, chosen: BoolArray) -> Logistic:
-    return fit_logistic(examples.features[chosen], examples.right[chosen])
+    return fit_logistic(examples.features[chosen], examples.right_place[chosen])
 
 
 def _fit_reach(examples: Examples, chosen: BoolArray) -> ReachParameters:
-    joins = chosen & examples.placed
+    joins = chosen & examples.placed & np.isfinite(examples.distance)
     if not joins.any():
         return ReachParameters()
     exact, bend = fit_reach(examples.reach[joins], examples.distance[joins])

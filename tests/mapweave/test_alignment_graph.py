@@ -66,12 +66,35 @@ def test_a_cluster_is_as_sure_as_the_weakest_link_it_needs() -> None:
     assert clusters[0].confidence == pytest.approx(0.95)
 
 
-def test_a_link_counts_as_its_place_is_sure_whatever_the_maps_are_bent_by() -> None:
-    bent = replace(CHAIN[0], confidence=0.3, evidence={"place": 0.9})
-    (cluster,), judged = cluster_components(NAMES[:3], [bent, CHAIN[1]], P)
-    (same,), _ = cluster_components(NAMES[:3], CHAIN[:2], P)
-    assert cluster.confidence == same.confidence
-    assert judged[0].confidence == 0.3
+def test_bent_maps_make_a_component_less_sure_and_their_places_decide_what_is_relied_on() -> None:
+    """Two that agree about the place outweigh a third, however little each is sure of the rest."""
+    circle = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
+    links = [replace(link(*pair, 0.3), evidence={"place": 0.97}) for pair in circle]
+    (bent,), judged = cluster_components(NAMES[:3], links[:2], P)
+    assert bent.confidence == pytest.approx(0.3)
+    assert [a.confidence for a in judged] == [0.3, 0.3]
+    lonely = replace(link(*circle[2], 0.6, error=(9, 0, 0)), evidence={"place": 0.6})
+    _, judged = cluster_components(NAMES[:3], [*links[:2], lonely], P)
+    assert [a.decision for a in judged] == ["accepted", "accepted", "ambiguous"]
+
+
+@pytest.mark.parametrize(("reach", "joined"), [(0.0, False), (40.0, True), (1e9, True)])
+def test_a_circle_of_bent_maps_may_miss_by_what_they_are_bent(reach: float, joined: bool) -> None:
+    pairs = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
+    evidence = {"place": 0.97, "reach": reach}
+    links = [replace(link(*pair, 0.9), evidence=evidence) for pair in pairs[:2]]
+    off = replace(link(*pairs[2], 0.9, error=(1.4, 0, 0)), evidence=evidence)
+    _, judged = cluster_components(NAMES[:3], [*links, off], P)
+    assert all(a.decision == "accepted" for a in judged) == joined
+
+
+def test_no_reach_excuses_another_place() -> None:
+    evidence = {"place": 0.97, "reach": 1e300}
+    pairs = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
+    links = [replace(link(*pair, 0.9), evidence=evidence) for pair in pairs[:2]]
+    off = replace(link(*pairs[2], 0.9, error=(9.0, 0, 0)), evidence=evidence)
+    _, judged = cluster_components(NAMES[:3], [*links, off], P)
+    assert not all(a.decision == "accepted" for a in judged)
 
 
 @pytest.mark.parametrize("place", [-1e9, 0.0, 1e9])

@@ -62,6 +62,7 @@ def test_maps_bent_against_each_other_are_joined_in_parts() -> None:
     assert "pairs of parts agree" in found.reason
     assert found.evidence["parts"] >= 2
     assert found.evidence["spread"] <= P.distance
+    assert {"place", "reach"} <= found.evidence.keys()  # judged for the wholes
 
 
 def test_maps_that_are_rigid_are_joined_as_wholes() -> None:

@@ -9,10 +9,10 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place
-from mapweave.fusion import FusionParameters, align_maps, prepare
+from mapweave.fusion import FusionParameters, align_maps, align_robots, prepare
 from mapweave.map_raster import MapRaster
-from mapweave.maps import LineMap
-from mapweave.reach import ReachParameters, holds, reach
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
+from mapweave.reach import ReachParameters, holds, reach, slack
 from tests.mapweave.buildings import corridor, part, random_pose, shaken
 
 F, P = FusionParameters(), ReachParameters()
@@ -85,3 +85,37 @@ def test_maps_that_go_on_far_beyond_what_they_share_are_not_joined(rng: Generato
     assert near.confidence == pytest.approx(
         near.evidence["place"] * holds(near.evidence["reach"], P), rel=1e-9
     )
+
+
+def robot(name: str, lines: LineMap) -> RobotMap:
+    submap = Submap(0, 0, np.zeros(3), lines, Trajectory.empty())
+    return RobotMap(name, "boot", 1, (submap,))
+
+
+def test_robots_are_judged_by_their_reach_as_maps_are(rng: Generator) -> None:
+    one, other = shaken(part(HALL, 0, 50), rng), shaken(part(HALL, 20, 160), rng)
+    (found,) = align_robots(robot("a", one), robot("b", other))
+    alone = align_maps(("a/0", one), ("b/0", other))
+    assert (found.decision, found.reason) == (alone.decision, alone.reason)
+    assert found.confidence == pytest.approx(alone.confidence)
+
+
+def test_only_a_place_that_was_accepted_is_proven(rng: Generator) -> None:
+    bare = shaken(part(BARE, 10, 40), rng), shaken(part(BARE, 20, 60), rng)
+    nowhere = shaken(part(HALL, 0, 30), rng), shaken(part(BARE, 20, 60), rng)
+    for one, other in (bare, nowhere):
+        found = align_maps(("a/0", one), ("b/0", other))
+        assert found.decision != "accepted"
+        assert found.evidence
+        assert "place" not in found.evidence
+
+
+def test_what_others_say_of_their_reach_is_bounded() -> None:
+    assert slack(-5.0, P) == 0
+    assert slack(10.0, P) == pytest.approx(10 * slack(1.0, P))
+    assert slack(1e300, P) == slack(P.most, P)
+
+
+def test_nineteen_of_twenty_are_within_the_slack(rng: Generator) -> None:
+    off = rng.normal(0, P.bend * 20.0, (200_000, 2))
+    assert np.mean(np.hypot(*off.T) < slack(20.0, P)) == pytest.approx(0.95, abs=0.005)
