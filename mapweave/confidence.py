@@ -1,10 +1,10 @@
-"""Confidence: the probability that an alignment is right within 0.5 m and 5°, where both maps looked.
+"""Confidence: the probability that an alignment is right where both maps looked.
 
-What maps are bent by elsewhere is a matter of their reach (`reach`).
 A logistic model of a few numbers of the evidence, fitted offline by
 ``tests/benchmarks/fit_confidence.py``, says how probably the evidence comes from one place seen
 twice. Where a different transform has evidence of its own, that probability is shared between the
-two: in a building that half a turn maps onto itself, each is right half of the time.
+two: in a building that half a turn maps onto itself, each is right half of the time. What maps may
+be bent by elsewhere is a matter of their reach (`reach`).
 """
 
 import numpy as np
