@@ -80,7 +80,22 @@ def is_credible(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
     return tracked.evidence.score >= p.convincing or doubt <= p.max_doubt
 
 
-def is_found_again(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
+def tell_apart(found: Sequence[Tracked], parameters: AcceptanceParameters) -> list[Tracked]:
+    """Return the poses that count after a miss, where the best can be told from look-alikes.
+
+    None where a different pose is worth more than the best of them: along bare walls many are as
+    good, and the one that is held is so by chance.
+    """
+    p = parameters
+    again = [tracked for tracked in found if _is_found_again(tracked, p)]
+    best = max(again, key=lambda t: t.value(p.novelty), default=None)
+    if best is None:
+        return []
+    outdone = any(t.value(p.novelty) > best.value(p.novelty) for t in _rivals(best, found, p))
+    return [] if outdone else again
+
+
+def _is_found_again(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
     """Whether a pose counts after a miss: held in every direction, and better than look-alikes.
 
     The robot may be anywhere. So it must explain half of what is seen; or the robot should be there
@@ -110,9 +125,13 @@ def is_acceptable(
 
 def _best_rival(best: Tracked, found: Sequence[Tracked], p: AcceptanceParameters) -> float:
     """The best score of those that differ from `best`; -1 where none does."""
+    return max((t.evidence.score for t in _rivals(best, found, p)), default=-1.0)
+
+
+def _rivals(best: Tracked, found: Sequence[Tracked], p: AcceptanceParameters) -> list[Tracked]:
+    """Those that differ from `best`."""
     apart = se2.between(best.pose, np.stack([tracked.pose for tracked in found]))
     different = (np.hypot(*apart[:, :2].T) > p.rival_distance) | (
         np.abs(apart[:, 2]) > p.rival_turn
     )
-    rivals = [t.evidence.score for t, other in zip(found, different, strict=True) if other]
-    return max(rivals, default=-1.0)
+    return [t for t, other in zip(found, different, strict=True) if other]

@@ -20,7 +20,7 @@ from mapweave.acceptance import (
     Tracked,
     is_acceptable,
     is_credible,
-    is_found_again,
+    tell_apart,
 )
 from mapweave.arrays import FloatArray
 from mapweave.correspondence import CorrespondenceParameters, correspond
@@ -196,10 +196,11 @@ class Tracker:
         found: list[Tracked] = []
         for enough, starts in stages:
             found += self._reached(seen, starts())
-            best = max(found, key=lambda t: t.value(a.novelty), default=None)
+            likely = tell_apart(found, a) if self.missed else found
+            best = max(likely, key=lambda t: t.value(a.novelty), default=None)
             if best is not None and best.evidence.score >= enough and is_credible(best, a):
                 return self._slid(seen, best)
-        return best if best is not None and is_acceptable(best, found, a) else None
+        return best if best is not None and is_acceptable(best, likely, a) else None
 
     def _predictions(self, scan: Scan) -> FloatArray:
         """(k, 3) where the robot may be by now."""
@@ -212,26 +213,20 @@ class Tracker:
         return se2.between(self._odometry, scan.odometry)
 
     def _reached(self, seen: Observation, starts: FloatArray) -> list[Tracked]:
-        """Align from each of `starts` (k, 3); leave out where a robot cannot have got to.
-
-        After a miss, only where it can be told from look-alikes.
-        """
+        """Align from each of `starts` (k, 3); leave out where a robot cannot have got to."""
         p, missed = self.parameters, len(self.missed)
         reach = p.max_step * (1 + missed / 2)  # missed scans took time
         if missed:
             reach = min(reach, self._pace.reach(1 + missed))
         return [
-            t
-            for t in self._aligned(seen, starts)
-            if np.hypot(*(t.pose - self.pose)[:2]) <= reach
-            and (not missed or is_found_again(t, p.acceptance))
+            t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= reach
         ]
 
-    def _slid(self, seen: Observation, tracked: Tracked) -> Tracked:
+    def _slid(self, seen: Observation, tracked: Tracked) -> Tracked | None:
         """Look along the direction that the walls leave open, if they leave one: a corridor.
 
         Every place a bounded speed allows is tried, and where the pace would lead; what both sides
-        saw decides.
+        saw decides. After a miss it may leave none.
         """
         p = self.parameters
         held, directions = np.linalg.eigh(tracked.information[:2, :2])
@@ -245,7 +240,9 @@ class Tracker:
         starts[:, 2] = tracked.pose[2]
         starts[:, :2] += across * (across @ (tracked.pose - self.pose)[:2])
         starts[:, :2] += steps[:, None] * along
-        return max([tracked, *self._reached(seen, starts)], key=lambda t: t.value(p.open_novelty))
+        found = [tracked, *self._reached(seen, starts)]
+        likely = tell_apart(found, p.acceptance) if self.missed else found
+        return max(likely, key=lambda t: t.value(p.open_novelty), default=None)
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
