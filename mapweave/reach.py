@@ -19,7 +19,8 @@ from mapweave.verification import VerificationParameters, coinciding
 class ReachParameters(BaseModel):
     """How much maps are bent.
 
-    Most likely for the joins between stretches of the Freiburg, Intel, CSAIL and Seattle logs.
+    Most likely for the joins between stretches of the Freiburg, Intel, CSAIL and Seattle logs, and
+    of Killian Court, in 3 to 8.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -28,7 +29,7 @@ class ReachParameters(BaseModel):
         0.5, gt=0, description="[m] by which a map may be off at the median, to be joined right"
     )
     exact: float = Field(
-        0.055, gt=0, description="[m] standard deviation along x and y, where both looked"
+        0.045, gt=0, description="[m] standard deviation along x and y, where both looked"
     )
     bend: float = Field(
         0.0115,
