@@ -39,6 +39,12 @@ class DecisionParameters(BaseModel):
     min_complexity: float = Field(
         0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
     )
+    plain_held: float = Field(
+        4.0,
+        gt=0,
+        description="[m] held from which straight walls do: those across each other are a shape as"
+        " well, though doors and gaps keep them apart",
+    )
     min_confidence: float = Field(0.85, gt=0, lt=1, description="of an accepted alignment")
     max_rival: float = Field(
         0.5, gt=0, lt=1, description="score of the best different hypothesis, as a share"
@@ -91,7 +97,7 @@ def decide(
         )
     if v.held < p.min_held:
         return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
-    if best.complexity < p.min_complexity:
+    if best.complexity < p.min_complexity and v.held < p.plain_held:
         return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
     if rival is not None and rival.verdict.score > p.max_rival * v.score:
         as_well = f"fits as well, with {_tell(rival.verdict)}"

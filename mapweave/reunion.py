@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import lines_of
+from mapweave.decision import DecisionParameters
 from mapweave.fusion import FusionParameters, compare, prepare
 from mapweave.hypotheses import Shape
 from mapweave.maps import Alignment, Submap
@@ -27,7 +28,8 @@ class ReunionParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    fusion: FusionParameters = FusionParameters()
+    # Nothing undoes a join within a robot's map, so a shape is asked for, not straight walls alone.
+    fusion: FusionParameters = FusionParameters(decision=DecisionParameters(plain_held=math.inf))
     recognition: RecognitionParameters = RecognitionParameters()
     min_confidence: float = Field(
         0.5,

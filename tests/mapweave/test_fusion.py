@@ -270,3 +270,17 @@ def test_the_best_leads_by_metres_and_by_its_share(
     found, reason = decide(hypothesis(best, 0), hypothesis(rival, 9), 0.95, DecisionParameters())
     assert found == decision
     assert ("fits as well" in reason) == (rival > best / 2)
+
+
+@pytest.mark.parametrize(
+    ("complexity", "held", "decision"),
+    [(0.5, 3.0, "accepted"), (0.01, 3.0, "ambiguous"), (0.0, 4.5, "accepted")],
+)
+def test_straight_walls_tell_places_apart_where_enough_of_them_run_across_the_others(
+    complexity: float, held: float, decision: str
+) -> None:
+    verdict = Verdict(20.0, 0.0, 1.0, 0.02, held, 5.0)
+    best = Hypothesis(np.zeros(3), np.zeros(2), verdict, complexity)
+    found, reason = decide(best, None, 0.95, DecisionParameters())
+    assert found == decision
+    assert ("only straight walls" in reason) == (decision == "ambiguous")
