@@ -80,18 +80,25 @@ def is_credible(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
     return tracked.evidence.score >= p.convincing or doubt <= p.max_doubt
 
 
-def tell_apart(found: Sequence[Tracked], parameters: AcceptanceParameters) -> list[Tracked]:
+def tell_apart(
+    found: Sequence[Tracked], novelty: float, parameters: AcceptanceParameters
+) -> list[Tracked]:
     """Return the poses that count after a miss, where the best can be told from look-alikes.
 
-    None where a different pose is worth more than the best of them: along bare walls many are as
-    good, and the one that is held is so by chance.
+    None where a different pose of those `found` is worth more than the best of them: along bare
+    walls many are as good, and the one that is held is so by chance.
+
+    Parameters
+    ----------
+    novelty
+        What a return at a new place counts.
     """
-    p = parameters
-    again = [tracked for tracked in found if _is_found_again(tracked, p)]
-    best = max(again, key=lambda t: t.value(p.novelty), default=None)
+    again = [tracked for tracked in found if _is_found_again(tracked, parameters)]
+    best = max(again, key=lambda t: t.value(novelty), default=None)
     if best is None:
         return []
-    outdone = any(t.value(p.novelty) > best.value(p.novelty) for t in _rivals(best, found, p))
+    rivals = _rivals(best, found, parameters)
+    outdone = any(t.value(novelty) > best.value(novelty) for t in rivals)
     return [] if outdone else again
 
 
@@ -110,7 +117,7 @@ def _is_found_again(tracked: Tracked, parameters: AcceptanceParameters) -> bool:
 def is_acceptable(
     best: Tracked, found: Sequence[Tracked], parameters: AcceptanceParameters
 ) -> bool:
-    """Whether the best of all that was `found` is taken, though it explains little.
+    """Whether the best of all that was `found`, and counts, is taken, though it explains little.
 
     As at the edge of the known: where the robot should be and undisputed, or without a rival.
     """

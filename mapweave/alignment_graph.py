@@ -5,6 +5,7 @@ which are right, given what the maps say of how they come to lie; the others are
 named. The poses are fitted to those that are right.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,8 +21,8 @@ from mapweave.explanations import ExplanationParameters, bits, explain
 from mapweave.map_raster import MapRaster
 from mapweave.maps import Alignment
 from mapweave.pose_graph import Link, optimise
-from mapweave.reach import ReachParameters, slack
-from mapweave.reliance import component_confidence, part_right, rely
+from mapweave.reach import ReachParameters, bend
+from mapweave.reliance import component_confidence, part_right, rely, weakest_link
 
 SET_ASIDE = "set aside: "  # begins the reason of an accepted alignment that is not relied on
 REASON_LENGTH = 500  # characters, as many as a message carries
@@ -103,7 +104,7 @@ class _Graph:
         links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
         self._edge_of = {id(link): k for k, link in enumerate(links)}
         self._edges = [self._edge(link) for link in links]
-        self._sure = [link.confidence for link in links]
+        self._rigid = [_rigid(link) for link in links]
         seen = {self._number[name]: raster for name, raster in rasters.items()}
         witnesses = MapWitnesses(seen, self._middles, parameters.doubts)
         self._doubts = MapDoubts(len(names), self._edges, witnesses)
@@ -115,18 +116,17 @@ class _Graph:
         first, second = self._number[link.reference], self._number[link.other]
         there = se2.compose(link.transform, self._middles[second])
         # What is asked first is whether the places are right; that maps are bent is no objection.
-        place = link.evidence.get("place", link.confidence)
-        bent = slack(link.evidence.get("reach", 0.0), self._parameters.reach)
-        return Edge(first, second, se2.between(self._middles[first], there), place, bent)
+        bent = bend(link.evidence.get("reach", 0.0), self._parameters.reach)
+        return Edge(first, second, se2.between(self._middles[first], there), _place(link), bent)
 
     def clusters(self) -> list[Cluster]:
         """Return the clusters, in the order of their first components."""
         count, p = len(self._names), self._parameters.explanations
-        whole = [replace(e, confidence=c) for e, c in zip(self._edges, self._sure, strict=True)]
         return [
             Cluster(
                 self._poses(group),
-                component_confidence(group, count, whole, self._right, self._explanations, p),
+                component_confidence(group, count, self._edges, self._right, self._explanations, p)
+                * weakest_link(group, count, self._edges, self._right, self._rigid),
             )
             for group in groups(count, self._edges, self._right)
         ]
@@ -201,9 +201,8 @@ class _Graph:
         """(n, 3) poses that fit all edges `inside`, from `start`."""
         p = self._parameters
         place = {node: k for k, node in enumerate(group)}
-        covariance = np.diag([p.sigma**2, p.sigma**2, p.turn_sigma**2])
         links = [
-            Link(place[e.first], place[e.second], e.transform, covariance, trusted)
+            Link(place[e.first], place[e.second], e.transform, _covariance(e, p), trusted)
             for e, trusted in self._with_bridges(inside)
         ]
         return optimise(start, links)[0]
@@ -220,6 +219,23 @@ class _Graph:
                 self._edges[k],
                 is_needed and len(groups(count, self._edges, rest)) > parts,
             )
+
+
+def _place(link: Alignment) -> float:
+    """How probably the place is right; all that is known where nobody tells of the place."""
+    place = link.evidence.get("place", link.confidence)
+    return place if math.isfinite(place) else link.confidence
+
+
+def _rigid(link: Alignment) -> float:
+    """How probably the maps are right as wholes, if the place is."""
+    return min(link.confidence / max(_place(link), link.confidence, 1e-9), 1.0)
+
+
+def _covariance(edge: Edge, p: GraphParameters) -> FloatArray:
+    """(3, 3) of an alignment between the middles of two maps."""
+    squared = p.sigma**2 + edge.bend**2
+    return np.diag([squared, squared, p.turn_sigma**2])
 
 
 def _middle(raster: MapRaster | None) -> FloatArray:

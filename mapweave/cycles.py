@@ -13,6 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave import se2
 from mapweave.arrays import FloatArray
 
+LIKELY = 2.45  # standard deviations along x and y, within which 19 of 20 are
+
 
 class CycleParameters(BaseModel):
     """When a cycle of alignments closes."""
@@ -38,15 +40,15 @@ class Edge:
         (3,) of the second in the frame of the first [m, m, rad].
     confidence
         That it is right, before others are asked.
-    slack
-        [m] by which bent maps may add to what it errs by.
+    bend
+        [m] standard deviation along x and y that bent maps add to what it errs by.
     """
 
     first: int
     second: int
     transform: FloatArray
     confidence: float
-    slack: float = 0.0
+    bend: float = 0.0
 
 
 def bad_cycles(count: int, edges: Sequence[Edge], removed: int, p: CycleParameters) -> list[int]:
@@ -128,4 +130,4 @@ def bad_cycles_through(
 
 def _bent(edges: Sequence[Edge], mask: int) -> float:
     """[m²] that bends may add to what the cycle of the edges in `mask` misses by, squared."""
-    return sum(edge.slack**2 for k, edge in enumerate(edges) if mask >> k & 1)
+    return sum((LIKELY * edge.bend) ** 2 for k, edge in enumerate(edges) if mask >> k & 1)

@@ -1,8 +1,8 @@
 """The decision about an alignment, with its reason.
 
 The best hypothesis must explain much wall, contradict little free space, be held in every
-direction, share a shape, and leave the best *different* hypothesis far behind. Each condition that
-fails is the reason given.
+direction, share a shape or be held well by straight walls, and leave the best *different*
+hypothesis far behind. Each condition that fails is the reason given.
 """
 
 from dataclasses import asdict, dataclass
@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave import se2
 from mapweave.arrays import FloatArray
+from mapweave.confidence import percent
 from mapweave.maps import Decision
 from mapweave.verification import Verdict
 
@@ -105,7 +106,10 @@ def decide(
     next_best = _next_best(best, rival)
     lead = v.score - (max(rival.verdict.score, 0.0) if rival else 0.0)
     if sure < p.min_confidence or lead < p.min_lead:
-        return "ambiguous", f"{found}; {next_best}; too little to be sure ({sure:.0%})"
+        return (
+            "ambiguous",
+            f"{found}; {next_best}; too little to be sure of the place ({percent(sure)})",
+        )
     return "accepted", f"{found}; {next_best}"
 
 

@@ -81,10 +81,11 @@ def holds(reach: float, parameters: ReachParameters) -> float:
     return -math.expm1(-(p.tolerance**2) / (2 * spread**2))
 
 
-def slack(reach: float, parameters: ReachParameters) -> float:
-    """Return by how much [m] maps that reach this far may be off elsewhere: in 19 cases of 20.
+def bend(reach: float, parameters: ReachParameters) -> float:
+    """Return the standard deviation [m] along x and y that maps which reach this far have beyond.
 
-    What others say of the reach is bounded, for what may be off by any amount is never refuted.
+    What others say of the reach is bounded, for what may be off by any amount is never refuted;
+    what is no number is none.
     """
     p = parameters
-    return 2.45 * p.bend * min(max(reach, 0.0), p.most)
+    return p.bend * min(max(reach, 0.0), p.most) if math.isfinite(reach) else 0.0

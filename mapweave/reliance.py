@@ -59,6 +59,32 @@ def component_confidence(
     return 1 / (1 + against)
 
 
+def weakest_link(
+    group: Sequence[int],
+    count: int,
+    edges: Sequence[Edge],
+    right: Iterable[int],
+    worth: Sequence[float],
+) -> float:
+    """Return the least `worth` on the best ways that hold `group` together by the edges `right`.
+
+    1 for a node alone.
+
+    Parameters
+    ----------
+    worth
+        (n,) of each edge.
+    """
+    if len(group) == 1:
+        return 1.0
+    kept: list[int] = []
+    for k in sorted(right, key=lambda k: -worth[k]):
+        kept.append(k)
+        if list(group) in groups(count, edges, kept):
+            return worth[k]
+    raise ValueError(f"expected edges that hold {list(group)} together")
+
+
 def _share(
     group: Sequence[int],
     count: int,

@@ -196,11 +196,23 @@ class Tracker:
         found: list[Tracked] = []
         for enough, starts in stages:
             found += self._reached(seen, starts())
-            likely = tell_apart(found, a) if self.missed else found
-            best = max(likely, key=lambda t: t.value(a.novelty), default=None)
+            best = self._best(found, a.novelty)
             if best is not None and best.evidence.score >= enough and is_credible(best, a):
-                return self._slid(seen, best)
+                slides = self._slides(seen, best)
+                found += slides
+                best = self._best([best, *slides], p.open_novelty)
+                if best is not None:
+                    return best
+        likely = self._likely(found, a.novelty)
         return best if best is not None and is_acceptable(best, likely, a) else None
+
+    def _likely(self, found: list[Tracked], novelty: float) -> list[Tracked]:
+        """Those that count: after a miss, where the best can be told from look-alikes."""
+        return tell_apart(found, novelty, self.parameters.acceptance) if self.missed else found
+
+    def _best(self, found: list[Tracked], novelty: float) -> Tracked | None:
+        """The one worth most of those that count; None where none does."""
+        return max(self._likely(found, novelty), key=lambda t: t.value(novelty), default=None)
 
     def _predictions(self, scan: Scan) -> FloatArray:
         """(k, 3) where the robot may be by now."""
@@ -222,16 +234,16 @@ class Tracker:
             t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= reach
         ]
 
-    def _slid(self, seen: Observation, tracked: Tracked) -> Tracked | None:
+    def _slides(self, seen: Observation, tracked: Tracked) -> list[Tracked]:
         """Look along the direction that the walls leave open, if they leave one: a corridor.
 
         Every place a bounded speed allows is tried, and where the pace would lead; what both sides
-        saw decides. After a miss it may leave none.
+        saw decides.
         """
         p = self.parameters
         held, directions = np.linalg.eigh(tracked.information[:2, :2])
         if held[0] > p.open_direction * held[1]:
-            return tracked
+            return []
         along, across = directions[:, 0], directions[:, 1]
         way, _ = self._pace.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))
         usual = se2.rotation(self.pose[2]) @ way @ along
@@ -240,9 +252,7 @@ class Tracker:
         starts[:, 2] = tracked.pose[2]
         starts[:, :2] += across * (across @ (tracked.pose - self.pose)[:2])
         starts[:, :2] += steps[:, None] * along
-        found = [tracked, *self._reached(seen, starts)]
-        likely = tell_apart(found, p.acceptance) if self.missed else found
-        return max(likely, key=lambda t: t.value(p.open_novelty), default=None)
+        return self._reached(seen, starts)
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""

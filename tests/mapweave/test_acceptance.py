@@ -25,23 +25,23 @@ def pose(
 
 def test_a_pose_that_is_held_and_explains_most_counts() -> None:
     best, other = pose(0.5, 0.8), pose(1.5, 0.3, 0.2)
-    assert tell_apart([other, best], P) == [best]
+    assert tell_apart([other, best], P.novelty, P) == [best]
 
 
 def test_what_one_may_slide_along_or_explains_too_little_does_not_count() -> None:
-    assert tell_apart([pose(0.5, 0.9, information=OPEN)], P) == []
-    assert tell_apart([pose(0.5, 0.55, 0.3)], P) == []
-    assert tell_apart([], P) == []
+    assert tell_apart([pose(0.5, 0.9, information=OPEN)], P.novelty, P) == []
+    assert tell_apart([pose(0.5, 0.55, 0.3)], P.novelty, P) == []
+    assert tell_apart([], P.novelty, P) == []
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0])
 def test_nothing_counts_where_a_different_pose_is_worth_more(turn: float) -> None:
     """In a bare corridor many fit; the one that a door frame holds is so by chance."""
     held, better = pose(0.5, 0.7), pose(1.5 - turn, 0.8, turn=turn, information=OPEN)
-    assert tell_apart([held], P) == [held]
-    assert tell_apart([held, better], P) == []
+    assert tell_apart([held], P.novelty, P) == [held]
+    assert tell_apart([held, better], P.novelty, P) == []
 
 
 def test_a_pose_next_to_the_best_is_not_different() -> None:
     best, near = pose(0.5, 0.7), pose(0.7, 0.75, information=OPEN)
-    assert tell_apart([best, near], P) == [best]
+    assert tell_apart([best, near], P.novelty, P) == [best]

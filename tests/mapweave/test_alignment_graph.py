@@ -70,9 +70,10 @@ def test_bent_maps_make_a_component_less_sure_and_their_places_decide_what_is_re
     """Two that agree about the place outweigh a third, however little each is sure of the rest."""
     circle = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
     links = [replace(link(*pair, 0.3), evidence={"place": 0.97}) for pair in circle]
-    (bent,), judged = cluster_components(NAMES[:3], links[:2], P)
-    assert bent.confidence == pytest.approx(0.3)
-    assert [a.confidence for a in judged] == [0.3, 0.3]
+    for count in (2, 3):  # a circle proves the places, and tells nothing of the bends
+        (bent,), judged = cluster_components(NAMES[:3], links[:count], P)
+        assert bent.confidence == pytest.approx(0.3, abs=0.01)
+        assert [a.confidence for a in judged] == [0.3] * count
     lonely = replace(link(*circle[2], 0.6, error=(9, 0, 0)), evidence={"place": 0.6})
     _, judged = cluster_components(NAMES[:3], [*links[:2], lonely], P)
     assert [a.decision for a in judged] == ["accepted", "accepted", "ambiguous"]
@@ -97,7 +98,28 @@ def test_no_reach_excuses_another_place() -> None:
     assert not all(a.decision == "accepted" for a in judged)
 
 
-@pytest.mark.parametrize("place", [-1e9, 0.0, 1e9])
+def test_the_way_around_a_bent_map_counts() -> None:
+    """Of two ways to a component the one that is less bent tells how sure it is."""
+    sure = [
+        replace(link(*p, 0.9), evidence={"place": 0.9}) for p in (("a/0", "b/0"), ("b/0", "c/0"))
+    ]
+    bent = replace(link("a/0", "c/0", 0.2), evidence={"place": 0.9})
+    (cluster,), _ = cluster_components(NAMES[:3], [*sure, bent], P)
+    assert cluster.confidence > 0.9
+
+
+@pytest.mark.parametrize("away", range(4))
+def test_poses_follow_exact_links_where_a_bent_one_misses(away: int) -> None:
+    pairs = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
+    exact = {"place": 0.97, "reach": 0.0}
+    links = [replace(link(*pair, 0.95), evidence=exact) for pair in pairs[:2]]
+    error = [np.cos(away * np.pi / 2), np.sin(away * np.pi / 2), 0.0]
+    off = replace(link(*pairs[2], 0.3, error=error), evidence={"place": 0.97, "reach": 50.0})
+    (cluster,), _ = cluster_components(NAMES[:3], [*links, off], P)
+    assert_true_poses(cluster, 0.15)
+
+
+@pytest.mark.parametrize("place", [-1e9, 0.0, 1e9, np.nan])
 def test_a_place_that_is_no_probability_breaks_nothing(place: float) -> None:
     odd = replace(CHAIN[0], evidence={"place": place})
     (cluster,), _ = cluster_components(NAMES[:2], [odd], P)

@@ -9,9 +9,11 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.arrays import FloatArray
 from mapweave.assembly import place
+from mapweave.decision import Hypothesis, decide
 from mapweave.fusion import FusionParameters
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.reunion import Reunion, ReunionParameters, _covering
+from mapweave.verification import Verdict
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, corridor, part, random_pose, shaken
 
 
@@ -222,3 +224,12 @@ def test_however_often_a_place_was_seen_comparing_it_costs_no_more(parts: list[L
     assert len(covering) <= 4 * p.visits
     assert covering[-1] is laps[-1]
     assert {id(s.map.segments) for s in covering} >= {id(s.map.segments) for s in laps[-4:]}
+
+
+def test_within_a_robots_map_straight_walls_join_nothing_however_well_held() -> None:
+    """Nobody undoes such a join, so a shape is asked for; two robots are joined by the same."""
+    verdict = Verdict(60.0, 0.0, 1.0, 0.02, 50.0, 5.0)
+    straight = Hypothesis(np.zeros(3), np.zeros(2), verdict, 0.0)
+    within, between = ReunionParameters().fusion.decision, FusionParameters().decision
+    assert decide(straight, None, 0.99, within)[0] == "ambiguous"
+    assert decide(straight, None, 0.99, between)[0] == "accepted"

@@ -7,6 +7,7 @@ from numpy.random import Generator
 from mapweave import se2
 from mapweave.acceptance import Tracked
 from mapweave.arrays import FloatArray
+from mapweave.local_map import Evidence
 from mapweave.maps import LineMap
 from mapweave.observation import Observation, ObservationParameters, observe
 from mapweave.scan import Scan
@@ -192,3 +193,22 @@ def test_a_robot_that_lost_track_moves_as_it_did(rng: Generator) -> None:
     assert found[0] is not None and (found[0].pose == 0).all()
     assert found[-1] is not None
     assert abs(found[-1].pose[0] - 2.5) < 0.3
+
+
+@pytest.mark.parametrize(("better", "placed_again"), [(0.6, True), (0.9, False)])
+def test_after_a_miss_no_other_pose_may_be_worth_more(
+    better: float, placed_again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One along a bare wall that nothing holds, say: then neither is believed."""
+    tracker, scan = Tracker(), cast(WALLS, [9, 1, 0.3])
+    placed(tracker, scan)
+    seen = observed(scan)
+    tracker.missed.append(seen)
+    held, loose = np.diag([30.0, 6.0, 50.0]), np.diag([30.0, 0.2, 50.0])
+    candidates = [
+        Tracked(np.array([0.3, 0.0, 0.0]), Evidence(0.8, 0.0, 0.0), held),
+        Tracked(np.array([1.2, 0.0, 0.0]), Evidence(better, 0.0, 0.0), loose),
+    ]
+    monkeypatch.setattr(Tracker, "_aligned", lambda *_: candidates)
+    tracker.place(seen, LineMap.empty)
+    assert bool(tracker.settle()) == placed_again
