@@ -29,14 +29,14 @@ test-all: lint
 	$(BIN)/pytest -n 2
 
 bench: $(STAMP)
-	$(BIN)/python -m tests.benchmarks
+	$(BIN)/python -m benchmarks
 
 bench-map: $(STAMP)
-	$(BIN)/python -m tests.benchmarks map
-	$(BIN)/python -m tests.benchmarks kidnap
+	$(BIN)/python -m benchmarks map
+	$(BIN)/python -m benchmarks kidnap
 
 bench-fusion: $(STAMP)
-	$(BIN)/python -m tests.benchmarks fusion
+	$(BIN)/python -m benchmarks fusion
 
 clean:
 	rm -rf .venv demo team bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from mapweave import se2
-from mapweave.arrays import FloatArray
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap, RobotMap, Submap, component_name
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from mapweave.arrays import FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray, IntArray
 
 Decision = Literal["accepted", "ambiguous", "refused"]
 

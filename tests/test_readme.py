@@ -14,7 +14,7 @@ import pytest
 from pydantic import BaseModel
 
 from mapweave.cli import COMMAND_GROUP, Command
-from mapweave.file_formats import (
+from mapweave.io.map_schema import (
     AlignmentFile,
     ComponentFile,
     JointFile,
@@ -22,7 +22,8 @@ from mapweave.file_formats import (
     SubmapFile,
 )
 from mapweave.maps import JointComponent
-from mapweave_protocol import joint_maps, keys
+from mapweave_protocol import joint_maps
+from mapweave_protocol.wire import keys
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

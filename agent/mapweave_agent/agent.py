@@ -7,22 +7,22 @@ from contextlib import contextmanager
 
 import zenoh
 
-from mapweave.keeping import keep_joined
-from mapweave.mapper import Mapper
+from mapweave.mapping.mapper import Mapper
 from mapweave.maps import Alignment, RobotMap
-from mapweave.scan import Scan
-from mapweave_agent.comparer import Comparer, Outcome
-from mapweave_agent.comparing import ComparisonPlan
+from mapweave.scan.scan import Scan
+from mapweave.team.hysteresis import keep_joined
+from mapweave_agent.comparison_schedule import ComparisonSchedule
+from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
+from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.outbox import Outbox
-from mapweave_agent.planning import AgentParameters, PublicationPlan
-from mapweave_agent.reception import Reception
-from mapweave_agent.source import Pace
-from mapweave_agent.strays import without_strays
-from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
-from mapweave_protocol.inbox import Inbox
-from mapweave_protocol.keys import ALIGNMENT, LIVE, MAP, STATUS
-from mapweave_protocol.messages import AlignmentMessage, MapVersion, StatusMessage
-from mapweave_protocol.session import declare_subscriber
+from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
+from mapweave_agent.single_scan_filter import without_strays
+from mapweave_agent.source import ReplayClock
+from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.link.inbox import Inbox
+from mapweave_protocol.link.session import declare_subscriber
+from mapweave_protocol.wire.keys import ALIGNMENT, LIVE, MAP, STATUS
+from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
 MAX_ARRIVALS = 64  # taken in at once, so that a flood does not hold up mapping
@@ -53,7 +53,7 @@ class Agent:
         session: zenoh.Session,
         team: str,
         mapper: Mapper,
-        comparer: Comparer,
+        comparer: ComparisonWorker,
         total: int | None,
         parameters: AgentParameters,
     ) -> None:
@@ -63,9 +63,9 @@ class Agent:
         self._comparer = comparer
         self._total = total
         self._parameters = parameters
-        self._publication = PublicationPlan(parameters.map_interval)
-        self._comparisons = ComparisonPlan(mapper.robot, parameters)
-        self._reception = Reception(mapper.robot, mapper.boot, self._comparisons)
+        self._publication = PublicationSchedule(parameters.map_interval)
+        self._comparisons = ComparisonSchedule(mapper.robot, parameters)
+        self._reception = Dispatcher(mapper.robot, mapper.boot, self._comparisons)
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
         self._inbox = Inbox()
         self._published: RobotMap = mapper.robot_map()
@@ -74,7 +74,7 @@ class Agent:
         self._finished = False
         self._status_due = 0.0
 
-    def run(self, scans: Iterator[Scan], pace: Pace, stopping: Stopping) -> None:
+    def run(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         """Map all `scans`, then compare with the peers until `stopping`.
 
         Raises
@@ -84,7 +84,7 @@ class Agent:
         """
         with self._outbox, self._listening():
             _log.info("%s joins team %s", self._mapper.robot, self._team)
-            self._map_all(scans, pace, stopping)
+            self._map_all(scans, clock, stopping)
             if not stopping():
                 self._finish()
             while not stopping():
@@ -92,10 +92,10 @@ class Agent:
             if self._reception.refused:
                 _log.warning("%d messages were not valid and ignored", self._reception.refused)
 
-    def _map_all(self, scans: Iterator[Scan], pace: Pace, stopping: Stopping) -> None:
+    def _map_all(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         started = time.monotonic()
         for scan in scans:
-            due = started + pace.due(scan)
+            due = started + clock.due(scan)
             self._attend(0.0)
             while not stopping() and (left := due - time.monotonic()) > 0:
                 self._attend(min(left, POLL))
@@ -153,7 +153,7 @@ class Agent:
             if comparison is not None:
                 self._comparer.start(comparison)
 
-    def _publish_outcome(self, outcome: Outcome) -> Sequence[Alignment]:
+    def _publish_outcome(self, outcome: ComparisonOutcome) -> Sequence[Alignment]:
         """Return what was published: nothing where comparing failed."""
         comparison = outcome.comparison
         if outcome.alignments is None:

@@ -6,19 +6,19 @@ import sys
 from pathlib import Path
 
 from mapweave.cli import Command, argument, positive
-from mapweave.fusion import align_robots
-from mapweave.mapper import Mapper, MapperParameters
-from mapweave.names import check_id
-from mapweave.scan_range import ScanRange
+from mapweave.fusion.align import align_robots
+from mapweave.ids import check_id
+from mapweave.io.scan_range import ScanRange
+from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave_agent.agent import Agent
-from mapweave_agent.comparer import Comparer
-from mapweave_agent.planning import AgentParameters
-from mapweave_agent.settling import SettlingProcess
-from mapweave_agent.source import LogSource, Pace, parse_rate
+from mapweave_agent.backend_process import BackendProcess
+from mapweave_agent.comparison_worker import ComparisonWorker
+from mapweave_agent.publication_schedule import AgentParameters
+from mapweave_agent.source import LogSource, ReplayClock, parse_rate
 from mapweave_protocol.arguments import add_connection_arguments, connection_of
-from mapweave_protocol.keys import new_boot
-from mapweave_protocol.session import open_session
-from mapweave_protocol.stopping import stop_on_signal
+from mapweave_protocol.link.session import open_session
+from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.wire.keys import new_boot
 
 _log = logging.getLogger(__name__)
 
@@ -56,7 +56,7 @@ def _run(options: argparse.Namespace) -> int:
     )
     robot = check_id("robot", options.robot)
     team, endpoints = connection_of(options)
-    pace = Pace(options.rate)
+    clock = ReplayClock(options.rate)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
     source = LogSource.open(options.log, options.scans, _log.warning)
 
@@ -65,14 +65,14 @@ def _run(options: argparse.Namespace) -> int:
 
     mapping = MapperParameters()
     with (
-        Comparer(align_robots) as comparer,
-        SettlingProcess(mapping.settling) as settling,
+        ComparisonWorker(align_robots) as comparer,
+        BackendProcess(mapping.backend) as backend,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        mapper = Mapper(robot, new_boot(), mapping, settling)
+        mapper = Mapper(robot, new_boot(), mapping, backend)
         parameters = AgentParameters(map_interval=options.map_interval)
         agent = Agent(session, team, mapper, comparer, source.total, parameters)
-        agent.run(source.scans(), pace, stop_on_signal())
+        agent.run(source.scans(), clock, stop_on_signal())
     return 0
 
 

@@ -9,11 +9,11 @@ import zenoh
 import zenoh.ext as ze
 
 from mapweave.maps import RobotMap
-from mapweave_protocol.assembler import MapSender
-from mapweave_protocol.codec import encode
-from mapweave_protocol.keys import ALIGNMENT, LIVE, MAP, STATUS
-from mapweave_protocol.messages import AlignmentMessage, StatusMessage, Traffic
-from mapweave_protocol.session import declare_alignment_publisher, declare_map_publisher
+from mapweave_protocol.link.assembler import MapSender
+from mapweave_protocol.link.session import declare_alignment_publisher, declare_map_publisher
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.keys import ALIGNMENT, LIVE, MAP, STATUS
+from mapweave_protocol.wire.messages import AlignmentMessage, StatusMessage, Traffic
 
 
 class Outbox:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapweave.errors import FileError
-from mapweave.readers import read_scans
-from mapweave.scan import Scan
-from mapweave.scan_range import ScanRange
+from mapweave.io.readers import read_scans
+from mapweave.io.scan_range import ScanRange
+from mapweave.scan.scan import Scan
 
 NOMINAL_PERIOD = 0.2  # [s] between scans where the stamps do not tell; lidars turn at 5 Hz and more
 LONGEST_PAUSE = (
@@ -74,7 +74,7 @@ def _already_warned(_: str) -> None:
     """Damaged lines were reported when the log was opened."""
 
 
-class Pace:
+class ReplayClock:
     """When each scan is due, at a multiple of real time.
 
     Where the stamps stand still, run backwards, jump or are missing, scans follow each other at

@@ -13,16 +13,16 @@ from rich.text import Text
 
 from mapweave.cli import Command
 from mapweave.errors import FileError
-from mapweave.files import write_joint
-from mapweave.names import check_id
-from mapweave.picture import draw_joint
-from mapweave_deploy.crew import Crew
-from mapweave_deploy.display import open_display
-from mapweave_deploy.launcher import Outcome, Plan, free_endpoint, run_team, start_server
-from mapweave_deploy.options import check_source, configure
-from mapweave_deploy.report import tell_files, tell_outcome, tell_verdicts
-from mapweave_deploy.roster import Member, simulated_team, team_from_logs
-from mapweave_protocol.stopping import stop_on_signal
+from mapweave.ids import check_id
+from mapweave.io.map_files import write_joint
+from mapweave.pictures.picture import draw_joint
+from mapweave_deploy.run.display import open_display
+from mapweave_deploy.run.launcher import Plan, TeamOutcome, free_endpoint, run_team, start_server
+from mapweave_deploy.run.options import check_source, configure
+from mapweave_deploy.run.processes import ProcessGroup
+from mapweave_deploy.run.report import tell_files, tell_outcome, tell_verdicts
+from mapweave_deploy.run.team_plan import Member, simulated_team, team_from_logs
+from mapweave_protocol.link.stopping import stop_on_signal
 
 NAP = 0.2  # [s]
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     folder.create()
     _say(console, [_source(options)])
     # The crew stops before what it wrote to is removed.
-    with _unfinished_store(folder.store) as new, Crew(folder.logs) as crew:
+    with _unfinished_store(folder.store) as new, ProcessGroup(folder.logs) as crew:
         plan = _plan(options, folder, options.store or new)
         _say(console, [_how_to_watch(plan)])
         with open_display(console, plan.members) as display:
@@ -141,7 +141,7 @@ def _keep_store(written: Path, final: Path) -> Path:
     return final
 
 
-def _write(outcome: Outcome, folder: Folder) -> None:
+def _write(outcome: TeamOutcome, folder: Folder) -> None:
     write_joint(folder.joint, outcome.joint)
     draw_joint(outcome.joint, folder.picture, outcome.maps)
 
@@ -156,7 +156,7 @@ def _how_to_watch(plan: Plan) -> str:
     return f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}"
 
 
-def _stay(crew: Crew, plan: Plan, store: Path, console: Console) -> None:
+def _stay(crew: ProcessGroup, plan: Plan, store: Path, console: Console) -> None:
     """Serve what was stored until Ctrl-C, which is the way to end this."""
     stopping = stop_on_signal()
     start_server(crew, plan, store)

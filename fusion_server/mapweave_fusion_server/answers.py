@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from mapweave.errors import MapweaveError
 from mapweave_fusion_server.store import Store
-from mapweave_protocol.queries import JointQuery
+from mapweave_protocol.wire.queries import JointQuery
 
 
 class NothingToAnswerError(MapweaveError):

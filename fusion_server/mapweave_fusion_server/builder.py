@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from mapweave.maps import JointMap
-from mapweave.weaving import Weaver
+from mapweave.team.joint_optimization import JointOptimizer
 from mapweave_fusion_server.coordinator import Draft
-from mapweave_protocol.codec import encode
-from mapweave_protocol.messages import JointMapMessage
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.messages import JointMapMessage
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ class Built:
     payload: bytes
 
 
-class Builder:
+class VersionBuilder:
     """Builds one draft at a time; a context manager that waits for the last one.
 
     Parameters
@@ -47,11 +47,11 @@ class Builder:
 
     def __init__(self, series: str) -> None:
         self._series = series
-        self._weaver = Weaver()  # the worker's alone
+        self._weaver = JointOptimizer()  # the worker's alone
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
         self._future: Future[Built] | None = None
 
-    def __enter__(self) -> "Builder":
+    def __enter__(self) -> "VersionBuilder":
         return self
 
     def __exit__(

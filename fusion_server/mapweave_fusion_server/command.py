@@ -10,8 +10,8 @@ from mapweave_fusion_server.coordinator import CoordinatorParameters
 from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.arguments import add_connection_arguments, connection_of
-from mapweave_protocol.session import open_session
-from mapweave_protocol.stopping import stop_on_signal
+from mapweave_protocol.link.session import open_session
+from mapweave_protocol.link.stopping import stop_on_signal
 
 DEFAULT_INTERVAL: float = CoordinatorParameters().min_interval
 

@@ -11,12 +11,12 @@ from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.carrying import Change, SubmapPlace, carry, places_of
-from mapweave.joint import build_team_map
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name
-from mapweave.revocation import mark_revoked
-from mapweave.weaving import Weaver
-from mapweave_protocol.messages import AlignmentMessage, MapVersion
+from mapweave.team.joint_map import build_team_map
+from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
+from mapweave.team.revocation import mark_revoked
+from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 
 Run: TypeAlias = tuple[str, str]  # robot and boot
 REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
@@ -62,7 +62,7 @@ class Draft:
     alignments: tuple[Alignment, ...]
     before: tuple[Alignment, ...] = ()
 
-    def build(self, weaver: Weaver) -> JointMap:
+    def build(self, weaver: JointOptimizer) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
 
         Parameters

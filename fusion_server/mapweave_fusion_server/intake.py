@@ -13,13 +13,13 @@ from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, pair_of
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
-from mapweave_protocol.assembler import MapAssembler, MapSender
-from mapweave_protocol.codec import decode
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.inbox import Arrival, alignment_reader, map_reader
-from mapweave_protocol.keys import LIVE
-from mapweave_protocol.messages import AlignmentMessage, JointMapMessage, MapMessage
-from mapweave_protocol.story import Story
+from mapweave_protocol.link.assembler import MapAssembler, MapSender
+from mapweave_protocol.link.inbox import Arrival, alignment_reader, map_reader
+from mapweave_protocol.narration.story import Story
+from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.keys import LIVE
+from mapweave_protocol.wire.messages import AlignmentMessage, JointMapMessage, MapMessage
 
 _log = logging.getLogger(__name__)
 

@@ -10,15 +10,16 @@ import zenoh
 
 from mapweave.errors import MapweaveError
 from mapweave_fusion_server.answers import answer
-from mapweave_fusion_server.builder import Builder
+from mapweave_fusion_server.builder import VersionBuilder
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
-from mapweave_protocol import keys, session
-from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE
-from mapweave_protocol.inbox import Inbox
-from mapweave_protocol.story import Story
+from mapweave_protocol.link import session
+from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.link.inbox import Inbox
+from mapweave_protocol.narration.story import Story
+from mapweave_protocol.wire import keys
 
 POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
 ANSWERERS = 4  # one slow asker must not keep the others waiting
@@ -62,7 +63,7 @@ class Service:
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
-        self._builder = Builder(store.series)
+        self._builder = VersionBuilder(store.series)
 
     def run(self, stopping: Callable[[], bool]) -> None:
         """Serve until `stopping`; then publish what is pending.

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from mapweave.cli import Command
-from mapweave.export import EXPORT_SUFFIXES, check_export_suffix, export
-from mapweave.files import read_any
+from mapweave.io.export import EXPORT_SUFFIXES, check_export_suffix, export
+from mapweave.io.map_files import read_any
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:

@@ -4,16 +4,17 @@ import argparse
 from itertools import combinations
 from pathlib import Path
 
+from mapweave.atomic import check_outputs
 from mapweave.cli import Command
-from mapweave.confidence import percent
+from mapweave.commands.progress import track
 from mapweave.errors import FileError
-from mapweave.files import check_outputs, read_map, write_joint
-from mapweave.fusion import align_robots
-from mapweave.joint import build_team_map
+from mapweave.fusion.align import align_robots
+from mapweave.fusion.confidence import percent
+from mapweave.io.map_files import read_map, write_joint
 from mapweave.maps import Alignment, JointMap, RobotMap
-from mapweave.picture import check_picture_suffix, draw_joint
-from mapweave.progress import track
-from mapweave.weaving import Weaver, WeavingParameters
+from mapweave.pictures.picture import check_picture_suffix, draw_joint
+from mapweave.team.joint_map import build_team_map
+from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 
 EXIT_NOT_ALL_JOINED = 3
 
@@ -62,7 +63,7 @@ def fuse(maps: list[RobotMap]) -> JointMap:
         a for first, second in track(pairs, "comparing") for a in align_robots(first, second)
     ]
     # Nothing grows any more, and there is no next time.
-    weaver = Weaver(WeavingParameters(newest=True, at_once=1_000_000))
+    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1_000_000))
     return build_team_map(maps, alignments, 1, weaver)
 
 

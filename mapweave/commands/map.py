@@ -4,16 +4,17 @@ import argparse
 import sys
 from pathlib import Path
 
+from mapweave.atomic import check_outputs
 from mapweave.cli import Command, argument
+from mapweave.commands.progress import track
 from mapweave.errors import FileError
-from mapweave.files import check_outputs, write_map
-from mapweave.mapper import Mapper
+from mapweave.ids import check_id
+from mapweave.io.map_files import write_map
+from mapweave.io.readers import count_scans, read_scans
+from mapweave.io.scan_range import ScanRange
+from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
-from mapweave.names import check_id
-from mapweave.picture import check_picture_suffix, draw_map
-from mapweave.progress import track
-from mapweave.readers import count_scans, read_scans
-from mapweave.scan_range import ScanRange
+from mapweave.pictures.picture import check_picture_suffix, draw_map
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:

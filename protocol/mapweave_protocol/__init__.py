@@ -10,6 +10,6 @@ A team's maps in two lines::
 wants it, ``inbox`` reads what arrives, and ``asking`` puts questions to the coordinator.
 """
 
-from mapweave_protocol.subscriber import alignments, joint_maps, robot_maps, statuses
+from mapweave_protocol.link.subscriber import alignments, joint_maps, robot_maps, statuses
 
 __all__ = ["alignments", "joint_maps", "robot_maps", "statuses"]

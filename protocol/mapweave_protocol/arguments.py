@@ -2,8 +2,8 @@
 
 import argparse
 
-from mapweave.names import check_id
-from mapweave_protocol.session import DEFAULT_ENDPOINT, ENDPOINT_VARIABLE, default_endpoints
+from mapweave.ids import check_id
+from mapweave_protocol.link.session import DEFAULT_ENDPOINT, ENDPOINT_VARIABLE, default_endpoints
 
 DEFAULT_TEAM = "team"
 

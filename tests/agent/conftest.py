@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mapweave_deploy.simulation import simulate
+from mapweave_deploy.sim.simulation import simulate
 
 PATIENCE = 20.0  # [s]
 

@@ -12,22 +12,22 @@ import pytest
 import zenoh
 
 from mapweave.cli import EXIT_FAILED, EXIT_USAGE, main
-from mapweave.mapper import Mapper
+from mapweave.io.readers import read_scans
+from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
-from mapweave.readers import read_scans
-from mapweave_protocol import keys
-from mapweave_protocol.asking import ask_robot_map
-from mapweave_protocol.assembler import MESSAGES_TO_COMPLETE, MapAssembler, MapSender
-from mapweave_protocol.inbox import (
+from mapweave_protocol.link.asking import ask_robot_map
+from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler, MapSender
+from mapweave_protocol.link.inbox import (
     Inbox,
     alignment_reader,
     map_reader,
     read_presence,
     status_reader,
 )
-from mapweave_protocol.messages import AlignmentMessage, StatusMessage
-from mapweave_protocol.pairs import responsible
-from mapweave_protocol.session import declare_map_publisher, declare_subscriber, open_session
+from mapweave_protocol.link.session import declare_map_publisher, declare_subscriber, open_session
+from mapweave_protocol.wire import keys
+from mapweave_protocol.wire.messages import AlignmentMessage, StatusMessage
+from mapweave_protocol.wire.pairs import responsible
 
 MAPWEAVE = Path(sys.executable).with_name("mapweave")
 PATIENCE = 60.0  # [s]

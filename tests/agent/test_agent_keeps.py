@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
-from mapweave_protocol import keys
-from mapweave_protocol.assembler import MapSender
-from mapweave_protocol.session import declare_map_publisher, open_session
+from mapweave_protocol.link.assembler import MapSender
+from mapweave_protocol.link.session import declare_map_publisher, open_session
+from mapweave_protocol.wire import keys
 from tests.agent.test_agent import FIRST, PATIENCE, SECOND, Listener, agent, mapped
 
 WING = np.array([[60.0, 0.0, 460.0, 0.0], [460.0, 2.0, 60.0, 2.0]])  # [m] of bare corridor

@@ -8,15 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapweave.errors import FileError
-from mapweave.scan import Scan
-from mapweave.scan_range import ScanRange
-from mapweave_agent.source import NOMINAL_PERIOD, LogSource, Pace, parse_rate
+from mapweave.io.scan_range import ScanRange
+from mapweave.scan.scan import Scan
+from mapweave_agent.source import NOMINAL_PERIOD, LogSource, ReplayClock, parse_rate
 
 
 def dues(stamps: list[float], rate: float = 1.0) -> list[float]:
-    pace = Pace(rate)
+    clock = ReplayClock(rate)
     nothing = np.empty(0)
-    return [pace.due(Scan(k, stamp, nothing, nothing)) for k, stamp in enumerate(stamps)]
+    return [clock.due(Scan(k, stamp, nothing, nothing)) for k, stamp in enumerate(stamps)]
 
 
 def test_scans_follow_each_other_as_their_stamps_say() -> None:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave import se2
-from mapweave.arrays import FloatArray
+from benchmarks.calibration import within_two_sigma
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
-from tests.benchmarks.calibration import within_two_sigma
 
 SCANS = 4000
 

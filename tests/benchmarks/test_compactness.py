@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapweave.readers import read_scans
-from tests.benchmarks.compactness import compactness
-from tests.benchmarks.coverage import explained_share, returns_at
-from tests.benchmarks.mapping import merge, segments_of
-from tests.benchmarks.runs import map_scans
-from tests.benchmarks.truth import paths
+from benchmarks.compactness import compactness
+from benchmarks.coverage import explained_share, returns_at
+from benchmarks.mapping import merge, segments_of
+from benchmarks.runs import map_scans
+from benchmarks.truth import paths
+from mapweave.io.readers import read_scans
 
 WALL = [0.0, 0.0, 4.0, 0.0]
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mapweave.scan import Scan
-from tests.benchmarks.coverage import explained_share, metres_in_common, returns_at, wall_cells
+from benchmarks.coverage import explained_share, metres_in_common, returns_at, wall_cells
+from mapweave.scan.scan import Scan
 
 
 def test_returns_beyond_twelve_metres_and_blind_beams_do_not_count() -> None:

@@ -5,11 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from mapweave import se2
-from mapweave.arrays import FloatArray
-from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
-from mapweave.scan import Scan
-from tests.benchmarks.kidnap import (
+from benchmarks.kidnap import (
     LENGTH,
     Trial,
     after_the_jump,
@@ -18,6 +14,10 @@ from tests.benchmarks.kidnap import (
     tell,
     whereabouts,
 )
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
+from mapweave.scan.scan import Scan
 
 SCANS = 400
 

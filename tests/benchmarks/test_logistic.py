@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.benchmarks.logistic import (
+from benchmarks.logistic import (
     Logistic,
     brier_score,
     calibration_error,

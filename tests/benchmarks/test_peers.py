@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapweave import se2
-from mapweave.arrays import FloatArray
-from mapweave.scan import Scan
-from mapweave_deploy.arena import arena
-from mapweave_deploy.lidar import LidarParameters, measure
-from mapweave_deploy.office import office
-from mapweave_deploy.world import World
-from tests.benchmarks import fusion
-from tests.benchmarks.logs import Log
-from tests.benchmarks.peer_figures import balanced_threshold, f1, joined, safe_threshold
-from tests.benchmarks.peer_sweep import correlate
-from tests.benchmarks.peer_trials import Trial, judge, try_peer
-from tests.benchmarks.peer_types import Guess, Peer, View
-from tests.benchmarks.peer_views import FREE, UNKNOWN, WALL, thin, view
-from tests.benchmarks.peers import EXTRA, find_peers
+from benchmarks import fusion
+from benchmarks.logs import Log
+from benchmarks.peer_figures import balanced_threshold, f1, joined, safe_threshold
+from benchmarks.peer_sweep import correlate
+from benchmarks.peer_trials import Trial, judge, try_peer
+from benchmarks.peer_types import Guess, Peer, View
+from benchmarks.peer_views import FREE, UNKNOWN, WALL, thin, view
+from benchmarks.peers import EXTRA, find_peers
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.scan.scan import Scan
+from mapweave_deploy.sim.arena import arena
+from mapweave_deploy.sim.lidar import LidarParameters, measure
+from mapweave_deploy.sim.office import office
+from mapweave_deploy.sim.world import World
 
 PEERS = ("AKAZE (map_merge)", "ORB (map_merge)", "KISS-Matcher", "FFT rotation sweep")
 LIDAR = LidarParameters()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.arrays import FloatArray
-from tests.benchmarks.reach_fit import fit_reach
+from benchmarks.reach_fit import fit_reach
+from mapweave.geometry.arrays import FloatArray
 
 
 def drawn(rng: Generator, exact: float, bend: float) -> tuple[FloatArray, FloatArray]:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mapweave import se2
-from mapweave.alignment_graph import Cluster
+from benchmarks.team import fit_frame, is_held_twice
+from mapweave.geometry import se2
 from mapweave.maps import Alignment
-from tests.benchmarks.team import fit_frame, is_held_twice
+from mapweave.team.alignment_graph import Cluster
 from tests.mapweave.buildings import random_pose
 
 

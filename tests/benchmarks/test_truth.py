@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapweave import se2
-from mapweave.arrays import FloatArray
-from tests.benchmarks.logs import find_logs, load_scans, load_truth
-from tests.benchmarks.truth import (
+from benchmarks.logs import find_logs, load_scans, load_truth
+from benchmarks.truth import (
     Path2D,
     false_meetings,
     position_error,
     relation_error,
     steps_right,
 )
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
 
 
 def _walk(count: int, seed: int = 1) -> FloatArray:

@@ -19,7 +19,7 @@ import pytest
 import zenoh
 import zenoh.ext as ze
 
-from mapweave import se2
+from mapweave.geometry import se2
 from mapweave.maps import (
     Alignment,
     Decision,
@@ -30,11 +30,12 @@ from mapweave.maps import (
     Trajectory,
     component_name,
 )
-from mapweave_protocol import keys, session
-from mapweave_protocol.assembler import MapSender
-from mapweave_protocol.codec import encode
-from mapweave_protocol.inbox import Inbox, joint_reader
-from mapweave_protocol.messages import AlignmentMessage, MapVersion
+from mapweave_protocol.link import session
+from mapweave_protocol.link.assembler import MapSender
+from mapweave_protocol.link.inbox import Inbox, joint_reader
+from mapweave_protocol.wire import keys
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 
 MakeMap: TypeAlias = Callable[..., RobotMap]
 MakeAlignments: TypeAlias = Callable[..., AlignmentMessage]

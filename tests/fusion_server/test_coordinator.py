@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from mapweave import se2
+from mapweave.geometry import se2
 from mapweave.maps import JointMap, RobotMap
-from mapweave.weaving import Weaver
+from mapweave.team.joint_optimization import JointOptimizer
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters, Draft
-from mapweave_protocol.codec import encode
-from mapweave_protocol.messages import JointMapMessage
-from mapweave_protocol.model import WORLD_REACH
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.messages import JointMapMessage
+from mapweave_protocol.wire.model import WORLD_REACH
 
 if TYPE_CHECKING:
     from tests.fusion_server.conftest import MakeAlignments, MakeMap
@@ -44,7 +44,7 @@ def test_the_furthest_alignment_that_may_arrive_makes_a_version_that_can_be_sent
     for robot_map in maps:
         coordinator.receive_map(robot_map)
     coordinator.receive_alignments(make_alignments(*maps, transform=(WORLD_REACH, 0.0, 0.0)))
-    encode(JointMapMessage.pack(_make_version(coordinator).build(Weaver()), "s1"))
+    encode(JointMapMessage.pack(_make_version(coordinator).build(JointOptimizer()), "s1"))
 
 
 def test_no_version_is_due_before_anything_was_received() -> None:

@@ -9,10 +9,10 @@ from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import Intake
 from mapweave_fusion_server.store import Store
-from mapweave_protocol.assembler import MapSender
-from mapweave_protocol.inbox import Arrival
-from mapweave_protocol.keys import MAP
-from mapweave_protocol.story import Story
+from mapweave_protocol.link.assembler import MapSender
+from mapweave_protocol.link.inbox import Arrival
+from mapweave_protocol.narration.story import Story
+from mapweave_protocol.wire.keys import MAP
 
 SEGMENTS = 180_000  # of random numbers: four submaps fit into a message, eight do not
 

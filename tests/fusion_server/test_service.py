@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import mapweave_protocol
-from mapweave_protocol import keys
-from mapweave_protocol.asking import ask_joint_maps, ask_robot_map
-from mapweave_protocol.assembler import MapAssembler
-from mapweave_protocol.codec import encode
-from mapweave_protocol.messages import MapMessage
-from mapweave_protocol.queries import JointQuery
+from mapweave_protocol.link.asking import ask_joint_maps, ask_robot_map
+from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.wire import keys
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.messages import MapMessage
+from mapweave_protocol.wire.queries import JointQuery
 
 if TYPE_CHECKING:
     from tests.fusion_server.conftest import (

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from mapweave import se2
-from mapweave.weaving import Weaver
+from mapweave.geometry import se2
+from mapweave.team.joint_optimization import JointOptimizer
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import last_version
 from mapweave_fusion_server.store import Store
-from mapweave_protocol.codec import encode
-from mapweave_protocol.messages import JointMapMessage
-from mapweave_protocol.story import Story
+from mapweave_protocol.narration.story import Story
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.messages import JointMapMessage
 from tests.fusion_server.conftest import Network
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Team:
     def next_version(self) -> JointMap:
         """Return the version that is due, built."""
         assert self.coordinator.seconds_until_due(0.0) == 0.0
-        joint = self.coordinator.begin(0.0).build(Weaver())
+        joint = self.coordinator.begin(0.0).build(JointOptimizer())
         self.coordinator.finish(joint)
         return joint
 

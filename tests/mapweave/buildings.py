@@ -12,10 +12,10 @@ import shapely
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from mapweave import se2
-from mapweave.arrays import FloatArray
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
-from mapweave.scan import Scan
+from mapweave.scan.scan import Scan
 
 FRONT = np.radians(np.linspace(-90, 90, 181))
 AROUND = np.radians(np.linspace(-180, 179, 360))

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.random import Generator
 
-from mapweave import se2
 from mapweave.assembly import assemble, place, unite_lines
+from mapweave.geometry import se2
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory, component_name
 from tests.mapweave.buildings import BUILDING, part, random_pose
 

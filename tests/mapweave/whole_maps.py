@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.random import Generator
 
-from mapweave import se2
-from mapweave.arrays import FloatArray
 from mapweave.assembly import assemble, place, unite_lines
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import (
     JointComponent,
     JointMap,

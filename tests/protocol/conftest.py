@@ -22,7 +22,7 @@ from mapweave.maps import (
 
 ROUTER = """
 import sys, zenoh
-from mapweave_protocol.session import router_config
+from mapweave_protocol.link.session import router_config
 with zenoh.open(router_config(sys.argv[1:])):
     print("listening", flush=True)
     sys.stdin.read()

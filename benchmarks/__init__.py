@@ -1,0 +1,1 @@
+"""Measures mapweave on real logs: ``python -m benchmarks``."""

@@ -1,0 +1,1 @@
+"""A team as processes on this machine."""

@@ -1,0 +1,243 @@
+"""Runs a team as processes on this machine, from its start to its joint map."""
+
+import logging
+import socket
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import zenoh
+
+from mapweave.errors import MapweaveError
+from mapweave.maps import JointMap, RobotMap
+from mapweave_deploy.run.display import Display
+from mapweave_deploy.run.processes import ProcessGroup
+from mapweave_deploy.run.recorder import Recorder, is_done
+from mapweave_deploy.run.team_plan import Member
+from mapweave_fusion_server.store import Store
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.asking import ask_robot_map
+from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.link.inbox import Inbox
+from mapweave_protocol.link.session import open_session
+from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
+
+ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
+ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things
+POLL = 0.2  # [s] after which a dead process or the end is noticed
+EVERYTHING = "mapweave/@v1/{team}/**"
+CAPACITY = 100_000  # messages waiting to be counted
+
+_log = logging.getLogger(__name__)
+
+
+class TeamTimeoutError(MapweaveError):
+    """A team that was not done in time."""
+
+    def __init__(self, seconds: float, waiting_for: list[str]) -> None:
+        super().__init__(
+            f"the team was not done within {seconds:g} s, still to come: {', '.join(waiting_for)}"
+        )
+        self.seconds = seconds
+        self.waiting_for = waiting_for
+
+
+class NoJointMapError(MapweaveError):
+    """A coordinator that ended without a joint map."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What to run.
+
+    Attributes
+    ----------
+    team
+        The team's name.
+    members
+        Its robots.
+    rate
+        How fast logs are played: ``max`` or times real time.
+    listen
+        Where the router listens, such as ``tcp/127.0.0.1:7447``.
+    store
+        The coordinator's file.
+    timeout
+        When to give up [s]; None never does.
+    """
+
+    team: str
+    members: list[Member]
+    rate: str
+    listen: str
+    store: Path
+    timeout: float | None
+
+    @property
+    def robots(self) -> list[str]:
+        """The robots' ids."""
+        return [member.robot for member in self.members]
+
+    @property
+    def connection(self) -> list[str]:
+        """The arguments that every process of the team but the router takes."""
+        return ["--team", self.team, "--connect", self.listen]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TeamOutcome:
+    """What a team came to.
+
+    Attributes
+    ----------
+    joint
+        The last version of the joint map.
+    maps
+        By robot, its last map.
+    recorder
+        What was sent, and how far everybody came.
+    """
+
+    joint: JointMap
+    maps: dict[str, RobotMap]
+    recorder: Recorder
+
+
+def free_endpoint() -> str:
+    """Return an endpoint on this machine with a port nobody listens at."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
+    """Start the team, follow it until it is done, stop all but the router.
+
+    Raises
+    ------
+    ChildDiedError
+        If one of the processes ends.
+    TeamTimeoutError
+        If it takes too long.
+    """
+    deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
+    start_router(crew, plan)
+    recorder, inbox = Recorder(), Inbox(CAPACITY)
+    with (
+        open_session([plan.listen], patience=ROUTER_PATIENCE) as session,
+        session.declare_subscriber(EVERYTHING.format(team=plan.team), inbox.put),
+    ):
+        start_server(crew, plan, plan.store)
+        for member in plan.members:
+            _start_agent(crew, plan, member)
+        while not is_done(plan.robots, recorder.statuses):
+            _follow(crew, inbox, recorder, display)
+            _check_time(plan, deadline, _unfinished(plan, recorder))
+        # The coordinator publishes what is pending when it is told to stop, so all that is left
+        # to see to is that it has got everybody's last map.
+        while missing := _not_at_coordinator(session, plan, recorder):
+            _follow(crew, inbox, recorder, display)
+            _check_time(plan, deadline, [f"map of {robot}" for robot in missing])
+        crew.stop(lowest_stage=SERVER)
+        _drain(inbox, recorder, display)
+    return _read_outcome(plan, recorder)
+
+
+def start_router(crew: ProcessGroup, plan: Plan) -> None:
+    """Start the router and wait until it listens."""
+    crew.start("router", ROUTER, ["router", "--listen", plan.listen])
+    host, _, port = plan.listen.removeprefix("tcp/").rpartition(":")
+    deadline = time.monotonic() + ROUTER_PATIENCE
+    while not _listens(host, int(port)):
+        crew.check()
+        if time.monotonic() > deadline:
+            raise TeamTimeoutError(ROUTER_PATIENCE, ["router"])
+        time.sleep(POLL / 4)
+    crew.check()
+
+
+def start_server(crew: ProcessGroup, plan: Plan, store: Path) -> None:
+    """Start the coordinator on `store`."""
+    crew.start("server", SERVER, ["server", *plan.connection, "--store", str(store)])
+
+
+def _start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
+    first, behind_last = member.scans
+    scans = ["--scans", f"{first}:{behind_last}"]
+    source = ["--robot", member.robot, "--log", str(member.log), "--rate", plan.rate]
+    crew.start(f"agent {member.robot}", AGENT, ["agent", *source, *scans, *plan.connection])
+
+
+def _listens(host: str, port: int) -> bool:
+    try:
+        with socket.create_connection((host.strip("[]"), port), timeout=1.0):
+            return True
+    except OSError:
+        return False
+
+
+def _follow(crew: ProcessGroup, inbox: Inbox, recorder: Recorder, display: Display) -> None:
+    """Take in what arrives for a moment, show it, and look after the processes."""
+    arrival = inbox.get(POLL)
+    if arrival is not None:
+        for line in recorder.take(arrival):
+            display.say(line)
+    display.update(recorder.statuses)
+    crew.check()
+
+
+def _drain(inbox: Inbox, recorder: Recorder, display: Display) -> None:
+    while (arrival := inbox.get(0.0)) is not None:
+        for line in recorder.take(arrival):
+            display.say(line)
+
+
+def _check_time(plan: Plan, deadline: float | None, waiting_for: list[str]) -> None:
+    if plan.timeout is not None and deadline is not None and time.monotonic() > deadline:
+        raise TeamTimeoutError(plan.timeout, waiting_for)
+
+
+def _unfinished(plan: Plan, recorder: Recorder) -> list[str]:
+    """Return who has not finished, or that comparing is what is left."""
+    finished = {r for r, status in recorder.statuses.items() if status.state == "finished"}
+    return [r for r in plan.robots if r not in finished] or ["comparing the last maps"]
+
+
+def _not_at_coordinator(session: zenoh.Session, plan: Plan, recorder: Recorder) -> list[str]:
+    """Return the robots whose last map the coordinator has not got."""
+    missing = []
+    for robot in plan.robots:
+        status = recorder.statuses[robot]
+        held = _ask(session, plan.team, robot)
+        is_last = held is not None and (held.boot, held.version) == (
+            status.boot,
+            status.map_version,
+        )
+        if not is_last and status.submaps > 0:
+            missing.append(robot)
+    return missing
+
+
+def _ask(session: zenoh.Session, team: str, robot: str) -> MapMessage | None:
+    """Return the coordinator's map of `robot`, None as well if the answer is not valid."""
+    try:
+        return ask_robot_map(session, team, robot)
+    except MessageError as error:
+        _log.warning("answer ignored, %s", error)
+        return None
+
+
+def _read_outcome(plan: Plan, recorder: Recorder) -> TeamOutcome:
+    """Return what the coordinator, now stopped, left in its store."""
+    with Store(plan.store, plan.team) as store:
+        latest = store.version(store.latest_version)
+        maps = [store.map_of(robot) for robot in plan.robots]
+    if latest is None:
+        raise NoJointMapError("the robots placed no scan, so there is no joint map")
+    robot_maps = [MapAssembler().update(decode(MapMessage, payload)) for payload in maps if payload]
+    return TeamOutcome(
+        decode(JointMapMessage, latest).unpack(),
+        {robot_map.robot: robot_map for robot_map in robot_maps if robot_map is not None},
+        recorder,
+    )

@@ -1,0 +1,128 @@
+"""The arguments of ``mapweave team``."""
+
+import argparse
+import re
+from pathlib import Path
+
+from mapweave.cli import argument, positive
+from mapweave_deploy.sim.simulation import BUILDERS
+from mapweave_protocol.arguments import DEFAULT_TEAM
+from mapweave_protocol.link.session import MAX_PORT
+
+DEFAULT_ROBOTS = 3
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    parser.set_defaults(wrong_usage=parser.error)
+    _add_source(parser)
+    _add_run(parser)
+    _add_output(parser)
+
+
+def check_source(options: argparse.Namespace) -> None:
+    """End with a message on usage unless there is exactly one kind of source."""
+    if bool(options.logs) == (options.world is not None):
+        options.wrong_usage("expected either logs or --world")
+
+
+def _add_source(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "logs",
+        nargs="*",
+        type=Path,
+        metavar="LOG",
+        help="recorded scans, cut into overlapping stretches, one a robot; several logs are of"
+        " different buildings",
+    )
+    parser.add_argument(
+        "--world", choices=sorted(BUILDERS), help="a simulated place instead of logs"
+    )
+    parser.add_argument(
+        "--seed",
+        type=argument(_natural),
+        default=1,
+        metavar="S",
+        help="another seed furnishes the world otherwise (default 1)",
+    )
+    parser.add_argument(
+        "--robots",
+        type=argument(_positive),
+        default=DEFAULT_ROBOTS,
+        metavar="N",
+        help=f"how many; of several logs, for each (default {DEFAULT_ROBOTS})",
+    )
+
+
+def _add_run(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--rate",
+        type=argument(_rate),
+        default="max",
+        metavar="X",
+        help="play the scans at X times real time, or max (the default)",
+    )
+    parser.add_argument(
+        "--team", default=DEFAULT_TEAM, metavar="T", help=f"the team's id (default {DEFAULT_TEAM})"
+    )
+    parser.add_argument(
+        "--listen",
+        type=argument(_endpoint),
+        metavar="ENDPOINT",
+        help="where the router listens, such as tcp/127.0.0.1:7447 (default: a free port)",
+    )
+    parser.add_argument(
+        "--timeout",
+        type=argument(positive),
+        metavar="S",
+        help="give up after S seconds (default: never)",
+    )
+    parser.add_argument(
+        "--stay",
+        action="store_true",
+        help="keep router and coordinator for watchers when all is done, until Ctrl-C",
+    )
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("team"),
+        metavar="DIR",
+        help="folder for the joint map, its picture, the store and the logs (default team)",
+    )
+    parser.add_argument(
+        "--store",
+        type=Path,
+        metavar="FILE",
+        help="go on with this store of the coordinator's (default: a new one in DIR)",
+    )
+
+
+def _natural(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise ValueError(f"{text}: expected 0 or more")
+    return value
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise ValueError(f"{text}: expected 1 or more")
+    return value
+
+
+def _rate(text: str) -> str:
+    if text != "max":
+        positive(text)
+    return text
+
+
+def _endpoint(text: str) -> str:
+    """Return `text` if it is an endpoint that every process of the team can reach."""
+    match = re.fullmatch(r"tcp/[^\s/#?]+:([0-9]{1,5})", text)
+    if match is None or not 1 <= int(match[1]) <= MAX_PORT:
+        raise ValueError(f"{text}: expected tcp/HOST:PORT, the port from 1 to {MAX_PORT}")
+    return text

@@ -1,0 +1,156 @@
+"""What a team came to, in words."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mapweave.fusion.confidence import percent
+from mapweave.maps import Alignment, JointComponent, RobotMap
+from mapweave_deploy.run.evaluation import (
+    Limits,
+    PairEvaluation,
+    judge,
+    main_component,
+    scan_counts,
+)
+from mapweave_deploy.run.launcher import TeamOutcome
+from mapweave_deploy.run.team_plan import Member
+from mapweave_deploy.sim.occupancy import grid_bytes
+
+WORLD_LIMITS = Limits(0.3, np.radians(3.0))
+LOG_LIMITS = Limits(0.5, np.radians(5.0))
+SIMULATED = "the simulated truth"
+LOGGED = "the poses in the log (as good as the program that wrote them)"
+
+
+def tell_outcome(outcome: TeamOutcome, members: Sequence[Member]) -> Iterator[str]:
+    """Yield what happened: who joined whom, what was not joined and why, what was sent."""
+    yield ""
+    yield from _tell_robots(outcome, members)
+    yield from _tell_alignments(outcome.joint.alignments)
+    yield f"Joint map, version {outcome.joint.version}:"
+    for component in outcome.joint.components:
+        yield f"  {_tell_component(component)}"
+    yield from _tell_traffic(outcome, members)
+
+
+def tell_files(files: Sequence[tuple[str, Path]]) -> Iterator[str]:
+    """Yield the files that were written."""
+    width = max(len(kind) for kind, _ in files) + 1
+    yield "Written:"
+    for kind, path in files:
+        yield f"  {kind + ':':{width}} {path}"
+
+
+def _tell_robots(outcome: TeamOutcome, members: Sequence[Member]) -> Iterator[str]:
+    yield "Robots:"
+    for member in members:
+        status = outcome.recorder.statuses[member.robot]
+        parts = f", {status.components} components" if status.components > 1 else ""
+        yield (
+            f"  {member.robot}: {status.scans_placed} of {status.scans_seen} scans placed,"
+            f" {status.submaps} submaps{parts}"
+        )
+
+
+def _tell_alignments(alignments: Sequence[Alignment]) -> Iterator[str]:
+    yield "Who joined whom:"
+    joined = [a for a in alignments if a.decision == "accepted"]
+    for alignment in joined:
+        sure = percent(alignment.confidence)
+        yield f"  {_names(alignment)}, confidence {sure}: {alignment.reason}"
+    if not joined:
+        yield "  nobody"
+    others = [a for a in alignments if a.decision != "accepted"]
+    if others:
+        yield "What was not joined:"
+    for alignment in others:
+        yield f"  {_names(alignment)}, {alignment.decision}: {alignment.reason}"
+
+
+def _names(alignment: Alignment) -> str:
+    return f"{alignment.reference} and {alignment.other}"
+
+
+def _tell_component(component: JointComponent) -> str:
+    names = " + ".join(sorted(component.robots))
+    segments = f"{len(component.map.segments)} segments"
+    if len(component.robots) == 1:
+        return f"{names} alone, {segments}"
+    return f"{names}, confidence {percent(component.confidence)}, {segments}"
+
+
+def tell_verdicts(
+    outcome: TeamOutcome, members: Sequence[Member], *, simulated: bool
+) -> Iterator[str]:
+    """Yield how many components there are, and whether what was joined is right."""
+    limits = WORLD_LIMITS if simulated else LOG_LIMITS
+    verdicts = list(judge(outcome.joint, outcome.maps, members, limits))
+    yield from _tell_components(outcome, members, verdicts)
+    for verdict in verdicts:
+        yield f"  {verdict.reference} and {verdict.other}: {_tell_error(verdict)}"
+    if verdicts:
+        right = sum(verdict.right for verdict in verdicts)
+        yield (
+            f"{right} of {len(verdicts)} joined pairs are right within {limits.distance:g} m and"
+            f" {np.degrees(limits.angle):g}° of {SIMULATED if simulated else LOGGED}."
+        )
+
+
+def _tell_components(
+    outcome: TeamOutcome, members: Sequence[Member], verdicts: Sequence[PairEvaluation]
+) -> Iterator[str]:
+    """Yield in how many components the robots are, and what is left over."""
+    mains = {main_component(robot_map) for robot_map in outcome.maps.values()}
+    homes = [c for c in outcome.joint.components if not mains.isdisjoint(c.robots)]
+    yield f"{len(members)} robots in {len(homes)} component{'' if len(homes) == 1 else 's'}."
+    places = len({member.place for member in members})
+    if places > 1 and not any(np.isinf(verdict.distance) for verdict in verdicts):
+        yield f"Nothing is joined across the {places} logs."
+    for component in outcome.joint.components:
+        if mains.isdisjoint(component.robots):
+            yield f"  joined to none of them: {_tell_rest(component, outcome)}"
+    if not verdicts and any(len(component.robots) > 1 for component in outcome.joint.components):
+        yield "What was joined cannot be judged: there are no poses in the log."
+
+
+def _tell_rest(component: JointComponent, outcome: TeamOutcome) -> str:
+    """Tell a component that no robot's main part is in, and how many scans it has."""
+    counts = sum(map(scan_counts, outcome.maps.values()), Counter[str]())
+    scans = sum(counts[name] for name in component.robots)
+    return f"{' + '.join(sorted(component.robots))} ({scans} scan{'' if scans == 1 else 's'})"
+
+
+def _tell_error(verdict: PairEvaluation) -> str:
+    if np.isinf(verdict.distance):
+        return "WRONG: they are in different places"
+    error = f"off by {verdict.distance:.3f} m and {np.degrees(verdict.angle):.1f}°"
+    return f"right, {error}" if verdict.right else f"WRONG, {error}"
+
+
+def _tell_traffic(outcome: TeamOutcome, members: Sequence[Member]) -> Iterator[str]:
+    yield "What each robot sent:"
+    for member in members:
+        counts = outcome.recorder.sent(member.robot)
+        total = sum(count.size for count in counts.values())
+        kinds = ", ".join(
+            f"{_size(count.size)} in {count.messages} {kind} messages"
+            for kind, count in counts.items()
+        )
+        yield f"  {member.robot}: {_size(total)}: {kinds}"
+        if member.robot in outcome.maps:
+            yield f"      {_tell_grid(outcome.maps[member.robot], member)}"
+
+
+def _tell_grid(robot_map: RobotMap, member: Member) -> str:
+    plain, deflated = grid_bytes(member, robot_map)
+    return (
+        f"the same scans as an occupancy grid of 5 cm, once: {_size(plain)},"
+        f" deflated {_size(deflated)}"
+    )
+
+
+def _size(count: int) -> str:
+    return f"{count / 1000:.1f} kB"

@@ -1,0 +1,1 @@
+"""Simulated worlds, and the logs that robots bring from them."""

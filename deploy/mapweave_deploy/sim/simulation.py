@@ -1,0 +1,103 @@
+"""Makes the logs of a simulated team: each robot's scans in one file, the truth in another.
+
+A log is an ordinary CARMEN log of ``ROBOTLASER1`` lines whose pose fields are all zero, so that a
+robot's process is the same for a simulated and for a real log, and the truth cannot leak into it.
+"""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mapweave.errors import MapweaveError
+from mapweave.geometry.arrays import FloatArray
+from mapweave_deploy.sim.arena import arena
+from mapweave_deploy.sim.lidar import LidarParameters, measure
+from mapweave_deploy.sim.office import office
+from mapweave_deploy.sim.trajectories import Tour, TourParameters, plan_tours
+from mapweave_deploy.sim.world import World
+
+TRUTH_FORMAT = "mapweave/truth/1"
+BUILDERS: dict[str, Callable[[int], World]] = {"office": office, "arena": arena}
+TOURS = {"office": TourParameters(), "arena": TourParameters(length=30.0)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotLog:
+    """What the simulation wrote for one robot.
+
+    Attributes
+    ----------
+    robot
+        Its id: r1, r2, …
+    log, truth
+        The two files.
+    tour
+        The truth: when and from where each scan was taken.
+    """
+
+    robot: str
+    log: Path
+    truth: Path
+    tour: Tour
+
+
+def simulate(world: str, robots: int, seed: int, folder: Path) -> list[RobotLog]:
+    """Write ``r1.log``, ``r1-truth.json``, … into `folder`; the same seed gives the same bytes.
+
+    Raises
+    ------
+    MapweaveError
+        If there is no such world.
+    """
+    if world not in BUILDERS:
+        raise MapweaveError(f"no world {world!r}; there are {', '.join(BUILDERS)}")
+    place = BUILDERS[world](seed)
+    tours = plan_tours(place, robots, TOURS[world], np.random.default_rng([seed, robots]))
+    folder.mkdir(parents=True, exist_ok=True)
+    return [
+        _write(place, f"r{number}", tour, seed, number, folder)
+        for number, tour in enumerate(tours, start=1)
+    ]
+
+
+def _write(place: World, robot: str, tour: Tour, seed: int, number: int, folder: Path) -> RobotLog:
+    """Drive `tour`, measure, and write both files."""
+    lidar, rng = LidarParameters(), np.random.default_rng([seed, number, 1])
+    lines = [
+        scan_line(measure(place, pose, lidar, rng), float(stamp), lidar)
+        for stamp, pose in zip(tour.stamp, tour.pose, strict=True)
+    ]
+    log = RobotLog(robot, folder / f"{robot}.log", folder / f"{robot}-truth.json", tour)
+    log.log.write_text("".join(lines), encoding="ascii")
+    log.truth.write_text(_truth(place.name, seed, log), encoding="ascii")
+    return log
+
+
+def scan_line(ranges: FloatArray, stamp: float, lidar: LidarParameters) -> str:
+    """Return a ``ROBOTLASER1`` line of `ranges` (n,) [m] taken at `stamp` [s]; all poses zero.
+
+    The fields, after CARMEN's logger: laser type, start angle, field of view, resolution, maximum
+    range, accuracy, remission mode; n and the ranges; the number of remissions; laser pose, robot
+    pose, tv, rv, two safety distances, turn axis; time stamp, host, logger's time stamp.
+    """
+    n = lidar.beams
+    head = (
+        f"ROBOTLASER1 0 {-lidar.field_of_view / 2:.6f} {lidar.field_of_view:.6f}"
+        f" {lidar.field_of_view / (n - 1):.8f} {lidar.maximum_range:.2f} {lidar.noise:.3f} 0"
+    )
+    readings = " ".join(f"{reading:.3f}" for reading in ranges)
+    zeros = " ".join(["0"] * 11)
+    return f"{head} {n} {readings} 0 {zeros} {stamp:.6f} simulated {stamp:.6f}\n"
+
+
+def _truth(world: str, seed: int, log: RobotLog) -> str:
+    """Return the truth file: for each scan of the log its index and pose in the world."""
+    poses = [
+        [index, *(round(float(value), 6) for value in pose)]
+        for index, pose in enumerate(log.tour.pose)
+    ]
+    content = {"format": TRUTH_FORMAT, "world": world, "seed": seed, "robot": log.robot}
+    return json.dumps(content | {"poses": poses}) + "\n"

@@ -1,0 +1,1 @@
+"""Two maps to an alignment, with its decision and confidence."""

@@ -1,0 +1,221 @@
+"""Map fusion: the transform between two maps, or a reason why there is none (paper, VIII).
+
+Hypothesise by shape (H1, H2), align (V1), verify by what both maps saw (V2), decide. Where whole
+maps cannot be joined their parts are compared: maps may be bent. So an alignment of the right
+places is accepted only as far as it is right for the rest of the maps as well.
+"""
+
+import itertools
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.assembly import assemble
+from mapweave.fusion.confidence import ConfidenceParameters, confidence, percent
+from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, numbers, runner_up
+from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
+from mapweave.fusion.parts import PartParameters, agreed, cut
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.maps import Alignment, LineMap, RobotMap, component_name
+from mapweave.matching.distance_field import DistanceFieldParameters
+from mapweave.matching.hypotheses import HypothesisParameters, PreparedMap, different, hypothesise
+from mapweave.matching.icp import IcpParameters, Target, align_all
+from mapweave.matching.verification import VerificationParameters, shared_complexity, verify
+
+
+class FusionParameters(BaseModel):
+    """One model for each stage."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    raster: DistanceFieldParameters = DistanceFieldParameters()
+    hypotheses: HypothesisParameters = HypothesisParameters()
+    # Right transforms contradict next to nothing, wrong ones a metre in ten: at a weight of 5 the
+    # right one scored highest for every pair of stretches with 10 m and more in common.
+    verification: VerificationParameters = VerificationParameters(contradiction_weight=5.0)
+    icp: IcpParameters = IcpParameters(start_scale=0.25, end_scale=0.1, shrink=0.6)
+    icp_samples: int = Field(250, ge=10, description="of a map's walls, aligning hypotheses")
+    loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
+    confidence: ConfidenceParameters = ConfidenceParameters()
+    parts: PartParameters = PartParameters()
+    decision: DecisionParameters = DecisionParameters()
+    reach: ExtrapolationParameters = ExtrapolationParameters()
+    min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
+
+
+def align_robots(
+    reference: RobotMap, other: RobotMap, parameters: FusionParameters | None = None
+) -> list[Alignment]:
+    """Compare every component of `reference` with every one of `other`."""
+    p = parameters or FusionParameters()
+    ours, theirs = ([_Component(m, c, p) for c in m.components] for m in (reference, other))
+    return [_align(a, b, p) for a, b in itertools.product(ours, theirs)]
+
+
+class _Component:
+    """A component of a robot's map, prepared as a whole and, where it is asked for, in parts."""
+
+    def __init__(self, robot_map: RobotMap, number: int, p: FusionParameters) -> None:
+        self._robot_map, self._number, self._p = robot_map, number, p
+        self.name = component_name(robot_map.robot, number)
+        self.whole = prepare(assemble(robot_map, number), p)
+
+    @cached_property
+    def parts(self) -> list[PreparedMap]:
+        """Those with enough wall to compare."""
+        cuts = cut(self._robot_map, self._number, self._p.parts)
+        shapes = [prepare(lines, self._p) for lines in cuts] if len(cuts) > 1 else [self.whole]
+        return [shape for shape in shapes if shape is not None]
+
+
+def _align(first: _Component, second: _Component, p: FusionParameters) -> Alignment:
+    """Compare two components; in parts, where as wholes they cannot be joined: they may be bent."""
+    whole = compare(first.name, first.whole, second.name, second.whole, p)
+    found = whole if whole.decision == "accepted" else _in_parts(first, second, p) or whole
+    return _for_wholes(found, first.whole, second.whole, p)
+
+
+def _in_parts(first: _Component, second: _Component, p: FusionParameters) -> Alignment | None:
+    """Return the alignment that parts of two components agree about; None if there is none."""
+    pairs = list(itertools.product(first.parts, second.parts))
+    if len(pairs) < 2:
+        return None
+    found = [(compare(first.name, a, second.name, b, p), b) for a, b in pairs]
+    joined = [
+        (x, b.raster.oriented.points.mean(axis=0)) for x, b in found if x.decision == "accepted"
+    ]
+    return agreed([x for x, _ in joined], np.array([m for _, m in joined]), p.parts)
+
+
+def _for_wholes(
+    found: Alignment, first: PreparedMap | None, second: PreparedMap | None, p: FusionParameters
+) -> Alignment:
+    """Return `found` with the confidence that it is right for the maps as wholes, which are bent.
+
+    Where the place was proven, its evidence tells how sure that is.
+    """
+    if first is None or second is None or not found.evidence:
+        return found
+    far = reach(first.raster, second.raster, found.transform, p.verification)
+    sure = found.confidence * holds(far, p.reach)
+    evidence = {**found.evidence, "reach": far}
+    if found.decision == "accepted":
+        evidence["place"] = found.confidence
+    if found.decision != "accepted" or sure >= p.decision.min_confidence:
+        return replace(found, confidence=sure, evidence=evidence)
+    reason = (
+        f"{found.reason}; but from there the maps go on for {far:.0f} m, where they may be bent"
+        f" by more than {p.reach.tolerance:g} m: right as a whole with {percent(sure)} only"
+    )
+    return replace(found, decision="ambiguous", confidence=sure, reason=reason, evidence=evidence)
+
+
+def align_maps(
+    reference: tuple[str, LineMap],
+    other: tuple[str, LineMap],
+    parameters: FusionParameters | None = None,
+) -> Alignment:
+    """Find the transform from `other` to `reference`, each a component's name and its lines."""
+    p = parameters or FusionParameters()
+    (a, first), (b, second) = reference, other
+    prepared = prepare(first, p), prepare(second, p)
+    return _for_wholes(compare(a, prepared[0], b, prepared[1], p), *prepared, p)
+
+
+def prepare(lines: LineMap, p: FusionParameters) -> PreparedMap | None:
+    """Return what comparing `lines` takes; None where there is too little wall to compare."""
+    wall = np.hypot(*(lines.segments[:, 2:] - lines.segments[:, :2]).T).sum()
+    return PreparedMap.of(lines, p.hypotheses, p.raster) if wall >= p.min_wall else None
+
+
+def compare(
+    a: str,
+    first: PreparedMap | None,
+    b: str,
+    second: PreparedMap | None,
+    p: FusionParameters,
+    possible: FloatArray | None = None,
+) -> Alignment:
+    """Find the transform from `second`, called `b`, to `first`, called `a`, both prepared.
+
+    Decision and confidence are of the place: what maps are bent by elsewhere is not asked.
+
+    Parameters
+    ----------
+    possible
+        (n, 3) transforms of which one is near the right one, if that is known; without it, shapes
+        propose.
+    """
+    if first is None or second is None:
+        poor = a if first is None else b
+        return _no_alignment(a, b, f"{poor} has less than {p.min_wall:g} m of wall to compare")
+    ranked = find_alignments(first, second, p, possible)
+    if not ranked:
+        return _no_alignment(a, b, "no part of one has the shape of a part of the other")
+    best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
+    sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
+    decision, reason = decide(best, rival, sure, p.decision)
+    return Alignment(
+        a,
+        b,
+        best.transform,
+        decision,
+        sure,
+        reason,
+        numbers(best),
+        None if rival is None else runner_up(best, rival),
+    )
+
+
+def find_alignments(
+    first: PreparedMap, second: PreparedMap, p: FusionParameters, possible: FloatArray | None = None
+) -> list[Hypothesis]:
+    """Return the hypotheses that differ, best first; none where no shape proposes any."""
+    transforms, _ = hypothesise(first, second, p.hypotheses, p.verification, possible)
+    if len(transforms) == 0:
+        return []
+    aligned = _refined(first, second, transforms, p)
+    verdicts = [verify(first.raster, second.raster, t, p.verification) for t in aligned]
+    middle = second.raster.oriented.points.mean(axis=0)
+    # Two that ended in the same place are one, and not each other's rival.
+    ranked = different(aligned, np.array([v.score for v in verdicts]), middle, p.hypotheses)
+    return [
+        Hypothesis(
+            aligned[k],
+            se2.transform_points(aligned[k], middle),
+            verdicts[k],
+            _complexity(first, second, aligned[k], p),
+        )
+        for k in ranked[:2]
+    ]
+
+
+def _refined(
+    first: PreparedMap, second: PreparedMap, starts: FloatArray, p: FusionParameters
+) -> FloatArray:
+    """Align the walls of `second` to those of `first` (V1) from each of (k, 3) `starts`."""
+    oriented = second.raster.oriented
+    stride = 1 + (len(oriented) - 1) // p.icp_samples
+    target = Target.of(first.raster.oriented, p.icp)
+    # Held so loosely that any wall is stronger: only what no wall holds stays where it is.
+    prior = np.diag([1 / p.loose**2, 1 / p.loose**2, 0.0])
+    fits = align_all(oriented.at(slice(None, None, stride)), target, starts, p.icp, prior)
+    return np.array([fit.pose for fit in fits])
+
+
+def _complexity(
+    first: PreparedMap, second: PreparedMap, transform: FloatArray, p: FusionParameters
+) -> float:
+    """Return the complexity of what is shared [rad²], in the map that shows more of it (V2)."""
+    back = se2.inverse(transform)
+    return max(
+        shared_complexity(first.raster, second.raster, transform, second.lines, p.verification),
+        shared_complexity(second.raster, first.raster, back, first.lines, p.verification),
+    )
+
+
+def _no_alignment(a: str, b: str, reason: str) -> Alignment:
+    return Alignment(a, b, np.zeros(3), "refused", 0.0, reason)

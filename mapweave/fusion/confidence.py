@@ -1,0 +1,65 @@
+"""Confidence: the probability that an alignment is right where both maps looked.
+
+A logistic model of a few numbers of the evidence, fitted offline by
+``benchmarks/fit_confidence.py``, says how probably the evidence comes from one place seen
+twice. Where a different transform has evidence of its own, that probability is shared between the
+two: in a building that half a turn maps onto itself, each is right half of the time. What maps may
+be bent by elsewhere is a matter of their reach (`reach`).
+"""
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry.arrays import FloatArray
+from mapweave.matching.verification import Verdict
+
+
+class ConfidenceParameters(BaseModel):
+    """Coefficients of the logistic model, one for each of `features`, and the rival's share."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    intercept: float = Field(-10.4, description="log odds where all features are 0")
+    score: float = Field(3.62, description="for ln(1 + metres in common less those contradicted)")
+    held: float = Field(1.66, description="for ln(1 + metres that hold the weakest direction)")
+    rivalry: float = Field(
+        12.0,
+        gt=0,
+        description="power of score / rival's score that gives the odds between the two: at nine"
+        " tenths of the score a rival is a quarter as probable; most likely on the same pairs,"
+        " few of which tell",
+    )
+
+
+def features(best: Verdict) -> FloatArray:
+    """Return (2,) what the model looks at: score and held."""
+    return np.log1p(np.maximum([best.score, best.held], 0.0))
+
+
+def share(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
+    """Return the part, in [1/2, 1], that the best hypothesis has in what it shares with its rival.
+
+    Their odds are a power of the ratio of their scores: what two maps are bent against each other
+    costs a part of the score, whatever its size.
+    """
+    return float(1 / (1 + _rivalry(best, rival) ** parameters.rivalry))
+
+
+def confidence(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
+    """Return the probability that the best hypothesis has the right place, in (0, 1)."""
+    p = parameters
+    slopes = np.array([p.score, p.held])
+    either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best))))
+    return float(either * share(best, rival, p))
+
+
+def _rivalry(best: Verdict, rival: Verdict | None) -> float:
+    """Score of the rival as a share of the best one's, in [0, 1]; 0 where there is none."""
+    if rival is None:
+        return 0.0
+    return min(max(rival.score / max(best.score, 1e-9), 0.0), 1.0)
+
+
+def percent(probability: float) -> str:
+    """Return a probability for a person; what would round to 100 % is not certain all the same."""
+    return "over 99%" if probability >= 0.995 else f"{probability:.0%}"

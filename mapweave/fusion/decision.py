@@ -1,0 +1,156 @@
+"""The decision about an alignment, with its reason.
+
+The best hypothesis must explain much wall, contradict little free space, be held in every
+direction, share a shape or be held well by straight walls, and leave the best *different*
+hypothesis far behind. Each condition that fails is the reason given.
+"""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.fusion.confidence import percent
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.maps import Decision
+from mapweave.matching.verification import Verdict
+
+
+class DecisionParameters(BaseModel):
+    """What an alignment must show to be accepted.
+
+    The limits were set on stretches of the Intel, CSAIL and Seattle logs.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    min_common: float = Field(6.0, gt=0, description="[m] of wall in common")
+    min_overlap: float = Field(
+        0.95,
+        gt=0,
+        le=1,
+        description="of the wall that both looked at, the share in common: at least 0.976 for right"
+        " transforms of stretches of the Intel, CSAIL and Seattle logs; 0.91 for a wrong one in the"
+        " look-alike corridors of Killian Court",
+    )
+    min_held: float = Field(
+        2.5, gt=0, description="[m] of common wall across the weakest direction"
+    )
+    min_complexity: float = Field(
+        0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
+    )
+    plain_held: float = Field(
+        4.0,
+        gt=0,
+        description="[m] held from which straight walls do: those across each other are a shape as"
+        " well, though doors and gaps keep them apart",
+    )
+    min_confidence: float = Field(0.85, gt=0, lt=1, description="of an accepted alignment")
+    max_rival: float = Field(
+        0.5, gt=0, lt=1, description="score of the best different hypothesis, as a share"
+    )
+    min_lead: float = Field(
+        8.0,
+        ge=0,
+        description="[m] of score before the best different hypothesis: 8.4 m at least for right"
+        " transforms of stretches of the same logs and of Freiburg 079, but for one of 7.8 m;"
+        " 6.2 m for a wrong one between two buildings",
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypothesis:
+    """An aligned hypothesis with its verdict.
+
+    Attributes
+    ----------
+    transform
+        (3,) from the other map to the reference [m, m, rad].
+    place
+        (2,) where it takes the middle of the other map's wall [m]: what tells hypotheses apart,
+        because it depends on no frame.
+    verdict
+        What both maps say of it.
+    complexity
+        [rad²] of what is shared (V2).
+    """
+
+    transform: FloatArray
+    place: FloatArray
+    verdict: Verdict
+    complexity: float
+
+
+def decide(
+    best: Hypothesis, rival: Hypothesis | None, sure: float, p: DecisionParameters
+) -> tuple[Decision, str]:
+    """Return the decision and one sentence that gives the reason; `sure` is the confidence."""
+    v = best.verdict
+    found = _tell(v)
+    if v.common < p.min_common:
+        return "refused", f"only {v.common:.1f} m of wall in common"
+    if v.overlap < p.min_overlap:
+        return (
+            "refused",
+            f"{v.common:.0f} m of wall in common, but {v.contradicted:.0f} m of wall"
+            " where the other saw free space",
+        )
+    if v.held < p.min_held:
+        return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
+    if best.complexity < p.min_complexity and v.held < p.plain_held:
+        return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
+    if rival is not None and rival.verdict.score > p.max_rival * v.score:
+        as_well = f"fits as well, with {_tell(rival.verdict)}"
+        return "ambiguous", f"{found}; but {_elsewhere(best, rival)} {as_well}"
+    next_best = _next_best(best, rival)
+    lead = v.score - (max(rival.verdict.score, 0.0) if rival else 0.0)
+    if sure < p.min_confidence or lead < p.min_lead:
+        return (
+            "ambiguous",
+            f"{found}; {next_best}; too little to be sure of the place ({percent(sure)})",
+        )
+    return "accepted", f"{found}; {next_best}"
+
+
+def _tell(verdict: Verdict) -> str:
+    return f"{verdict.common:.0f} m of wall in common, {verdict.contradicted:.1f} m contradicted"
+
+
+def _next_best(best: Hypothesis, rival: Hypothesis | None) -> str:
+    """The rival and what speaks for and against it, in words."""
+    if rival is None or rival.verdict.common < 1:
+        return "nothing else fits"
+    return f"next best, {_elsewhere(best, rival)}, has {_tell(rival.verdict)}"
+
+
+def _elsewhere(best: Hypothesis, rival: Hypothesis) -> str:
+    """How the rival differs, in words."""
+    distance, turn = _difference(best, rival)
+    away, degrees = f"{distance:.0f} m away", np.degrees(turn)
+    return away if degrees < 9 else f"{away} and turned by {degrees:.0f}°"
+
+
+def _difference(best: Hypothesis, rival: Hypothesis) -> tuple[float, float]:
+    """How far apart two hypotheses put the other map [m], and how differently turned [rad]."""
+    x, y = rival.place - best.place
+    turn = se2.wrap(rival.transform[2] - best.transform[2])
+    return float(np.hypot(x, y)), float(abs(turn))
+
+
+def numbers(hypothesis: Hypothesis) -> dict[str, float]:
+    """Return the evidence by name, with the score."""
+    verdict = hypothesis.verdict
+    numbers = {k: float(v) for k, v in asdict(verdict).items() if k != "contradiction_weight"}
+    return {**numbers, "complexity": hypothesis.complexity, "score": verdict.score}
+
+
+def runner_up(best: Hypothesis, rival: Hypothesis) -> dict[str, object]:
+    """Return the rival's transform, how it differs [m], [rad], and its evidence by name."""
+    distance, turn = _difference(best, rival)
+    return {
+        "transform": [float(v) for v in rival.transform],
+        "distance": distance,
+        "turn": turn,
+        **numbers(rival),
+    }

@@ -1,0 +1,82 @@
+"""Rigid motions of the plane.
+
+A pose or transform is ``[x, y, theta]``: metres and radians. As a transform it takes coordinates
+in its own frame to coordinates in the parent's. Every function broadcasts over leading axes.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mapweave.geometry.arrays import FloatArray
+
+IDENTITY: FloatArray = np.zeros(3)
+IDENTITY.setflags(write=False)
+LEVER = 1.0  # [m], how much a heading weighs against a position in a fit
+
+
+def wrap(angle: ArrayLike) -> FloatArray:
+    """Return `angle` [rad] in (-pi, pi]."""
+    return np.asarray(np.pi - np.mod(np.pi - np.asarray(angle, dtype=float), 2 * np.pi))
+
+
+def compose(first: ArrayLike, second: ArrayLike) -> FloatArray:
+    """Return the pose of frame `second`, given in frame `first`, in the parent of `first`.
+
+    Both are ``(..., 3)`` [m, m, rad]; so is the result, its angle in (-pi, pi].
+    """
+    a, b = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
+    c, s = np.cos(a[..., 2]), np.sin(a[..., 2])
+    return np.stack(
+        [
+            a[..., 0] + c * b[..., 0] - s * b[..., 1],
+            a[..., 1] + s * b[..., 0] + c * b[..., 1],
+            wrap(a[..., 2] + b[..., 2]),
+        ],
+        axis=-1,
+    )
+
+
+def inverse(pose: ArrayLike) -> FloatArray:
+    """Return the ``(..., 3)`` inverse of `pose`."""
+    p = np.asarray(pose, dtype=float)
+    c, s = np.cos(p[..., 2]), np.sin(p[..., 2])
+    return np.stack(
+        [-c * p[..., 0] - s * p[..., 1], s * p[..., 0] - c * p[..., 1], wrap(-p[..., 2])], axis=-1
+    )
+
+
+def between(origin: ArrayLike, target: ArrayLike) -> FloatArray:
+    """Return the ``(..., 3)`` pose of `target` in the frame of `origin`; both share a parent."""
+    return compose(inverse(origin), target)
+
+
+def rotation(theta: float) -> FloatArray:
+    """Return the ``(2, 2)`` rotation matrix of `theta` [rad]."""
+    c, s = np.cos(theta), np.sin(theta)
+    return np.array([[c, -s], [s, c]])
+
+
+def transform_points(pose: ArrayLike, points: ArrayLike) -> FloatArray:
+    """Return ``(..., 2)`` `points` [m], given in the frame at `pose` ``(3,)``, in its parent."""
+    p = np.asarray(pose, dtype=float)
+    return np.asarray(np.asarray(points, dtype=float) @ rotation(p[2]).T + p[:2])
+
+
+def transform_segments(pose: ArrayLike, segments: ArrayLike) -> FloatArray:
+    """Return ``(n, 4)`` `segments` [m], given in the frame at `pose` ``(3,)``, in its parent."""
+    s = np.asarray(segments, dtype=float)
+    return np.asarray(transform_points(pose, s.reshape(-1, 2)).reshape(s.shape))
+
+
+def fit(poses: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the motion (3,) that takes `poses` (m, 3) closest to `target` (m, 3).
+
+    Least squares over positions and, with the lever, headings: a path on one spot has only those.
+    In the plane the best rotation is the direction of a sum of complex numbers.
+    """
+    p, q = poses[:, 0] + 1j * poses[:, 1], target[:, 0] + 1j * target[:, 1]
+    turned = np.sum(np.conj(p - np.mean(p)) * (q - np.mean(q)))
+    turned += LEVER**2 * np.sum(np.exp(1j * (target[:, 2] - poses[:, 2])))
+    theta = np.angle(turned)
+    shift = np.mean(q) - np.exp(1j * theta) * np.mean(p)
+    return np.array([shift.real, shift.imag, theta])

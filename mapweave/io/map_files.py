@@ -1,0 +1,234 @@
+"""Reading and writing map files: ``MAP.json`` (one robot) and ``JOINT.json`` (the team).
+
+Numbers are rounded to 0.1 mm and 1 µrad, far below what a laser resolves, to keep files compact.
+"""
+
+import json
+import math
+import reprlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import ValidationError
+
+from mapweave.atomic import replace_file
+from mapweave.errors import FileError
+from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.io.map_schema import JOINT_FORMAT, MAP_FORMAT, HeaderFile, JointFile, MapFile
+from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
+from mapweave.maps import Alignment, JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
+
+_EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
+_METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
+"""Decimals that are written of each kind of number."""
+
+_File = TypeVar("_File", HeaderFile, MapFile, JointFile)
+_Values = TypeVar("_Values", FloatArray, IntArray)
+
+
+def read_map(path: str | Path) -> RobotMap:
+    """Return the robot map in the file at `path`, which may be gzipped.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or is not a robot map in every field.
+    """
+    source = Path(path)
+    return _check(source, _content(source), MapFile).to_map()
+
+
+def read_joint(path: str | Path) -> JointMap:
+    """Return the joint map in the file at `path`, which may be gzipped.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or is not a joint map in every field.
+    """
+    source = Path(path)
+    return _check(source, _content(source), JointFile).to_map()
+
+
+def read_any(path: str | Path) -> RobotMap | JointMap:
+    """Return the robot map or joint map in the file at `path`, whichever its format says.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or is neither in every field.
+    """
+    source = Path(path)
+    content = _content(source)
+    if _check(source, content, HeaderFile).format == MAP_FORMAT:
+        return _check(source, content, MapFile).to_map()
+    return _check(source, content, JointFile).to_map()
+
+
+def write_map(path: str | Path, robot_map: RobotMap) -> None:
+    """Write `robot_map` to `path`, whole or not at all.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    content = {
+        "format": MAP_FORMAT,
+        "robot": robot_map.robot,
+        "boot": robot_map.boot,
+        "version": robot_map.version,
+        "submaps": [_submap(submap) for submap in robot_map.submaps],
+    }
+    _write(path, content)
+
+
+def write_joint(path: str | Path, joint: JointMap) -> None:
+    """Write `joint` to `path`, whole or not at all.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    content = {
+        "format": JOINT_FORMAT,
+        "version": joint.version,
+        "alignments": [_alignment(alignment) for alignment in joint.alignments],
+        "components": [_component(component) for component in joint.components],
+    }
+    _write(path, content)
+
+
+def _content(path: Path) -> bytes:
+    """Return what is in the file, unpacked."""
+    try:
+        with path.open("rb") as file:
+            return b"".join(read_blocks(file))
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror}); {_EXPECTED}") from error
+    except (DamagedStreamError, UnusableArchiveError) as error:
+        raise FileError(path, f"{error}; {_EXPECTED}") from error
+
+
+def _check(path: Path, content: bytes, model: type[_File]) -> _File:
+    try:
+        return model.model_validate_json(content)
+    except ValidationError as error:
+        raise FileError(path, _first_problem(error)) from error
+
+
+def _first_problem(error: ValidationError) -> str:
+    """Return where the first problem is, what it is and what was found: ``submaps[0].pose: …``."""
+    problem = error.errors(include_url=False, include_context=False)[0]
+    message = problem["msg"].removeprefix("Value error, ")
+    found = problem["input"]
+    if isinstance(found, str | float | int) and problem["loc"]:
+        message += f", found {reprlib.repr(found)}"
+    place = "".join(_step(step) for step in problem["loc"]).removeprefix(".")
+    if not place or problem["type"] == "missing":
+        message += f"; {_EXPECTED}"
+    return f"{place}: {message}" if place else message
+
+
+def _step(step: int | str) -> str:
+    """Return a step on the way to a field; what the file made up itself is quoted."""
+    if step == "[key]":  # pydantic's word for: not the value but its name.
+        return ""
+    if isinstance(step, str) and step.isidentifier():
+        return f".{step}"
+    return f"[{reprlib.repr(step)}]"
+
+
+def _write(path: str | Path, content: object) -> None:
+    with replace_file(path) as temporary:
+        text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _submap(submap: Submap) -> dict[str, object]:
+    return {
+        "id": submap.id,
+        "component": submap.component,
+        "pose": _pose(submap.pose),
+        **_line_map(submap.map),
+        "trajectory": _trajectory(submap.trajectory),
+        **_uncertainty(submap.trajectory),
+    }
+
+
+def _trajectory(trajectory: Trajectory) -> list[list[object]]:
+    rows = zip(trajectory.scan_index, trajectory.stamp, trajectory.pose, strict=True)
+    return [[int(index), _number(stamp, _SECONDS), *_pose(pose)] for index, stamp, pose in rows]
+
+
+def _uncertainty(trajectory: Trajectory) -> dict[str, object]:
+    """Return the rows beside those of the trajectory, where they are known."""
+    if trajectory.uncertainty is None:
+        return {}
+    return {"uncertainty": np.round(trajectory.uncertainty, _METRES).tolist()}
+
+
+def _line_map(lines: LineMap) -> dict[str, object]:
+    return {
+        "polylines": [_metres(polyline) for polyline in lines.polylines],
+        "support": [row.tolist() for row in _by_polyline(lines, lines.support)],
+        "free_space": [_metres(polygon) for polygon in lines.free_space],
+    }
+
+
+def _by_polyline(lines: LineMap, values: _Values) -> list[_Values]:
+    """Split `values`, one for each segment, as the segments are split into polylines."""
+    starts = np.flatnonzero(np.diff(lines.polyline)) + 1
+    return np.split(values, starts) if len(values) else []
+
+
+def _alignment(alignment: Alignment) -> dict[str, object]:
+    return {
+        "reference": alignment.reference,
+        "other": alignment.other,
+        "transform": _pose(alignment.transform),
+        "confidence": _number(alignment.confidence, _RATIOS),
+        "decision": alignment.decision,
+        "reason": alignment.reason,
+        "evidence": _plain(alignment.evidence),
+        "runner_up": _plain(alignment.runner_up),
+    }
+
+
+def _component(component: JointComponent) -> dict[str, object]:
+    confidences = _by_polyline(component.map, component.segment_confidence)
+    return {
+        "robots": {name: _pose(pose) for name, pose in component.robots.items()},
+        "confidence": _number(component.confidence, _RATIOS),
+        **_line_map(component.map),
+        "segment_confidence": [np.round(row, _METRES).tolist() for row in confidences],
+    }
+
+
+def _pose(pose: ArrayLike) -> list[float]:
+    x, y, theta = np.asarray(pose, dtype=float).tolist()
+    return [round(x, _METRES), round(y, _METRES), round(theta, _RADIANS)]
+
+
+def _metres(points: FloatArray) -> list[list[float]]:
+    rounded: list[list[float]] = np.round(points, _METRES).tolist()
+    return rounded
+
+
+def _number(value: float, decimals: int) -> float | None:
+    return round(float(value), decimals) if math.isfinite(value) else None
+
+
+def _plain(value: object) -> object:
+    """Return `value` as JSON can hold it: no arrays, and ``null`` for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(entry) for name, entry in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(entry) for entry in value]
+    return _number(value, _RATIOS) if isinstance(value, float) else value

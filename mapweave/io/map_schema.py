@@ -1,0 +1,255 @@
+"""What stands in ``MAP.json`` and ``JOINT.json``, as models that check it and turn it into maps.
+
+Fields that are not known here are ignored, so that a later version may add some. A number that
+is not known (a stamp, say) is NaN in memory and ``null`` in the file.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal, TypeAlias
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    model_validator,
+)
+
+from mapweave.geometry.arrays import FloatArray
+from mapweave.ids import ID_PATTERN
+from mapweave.maps import (
+    Alignment,
+    Decision,
+    JointComponent,
+    JointMap,
+    LineMap,
+    RobotMap,
+    Submap,
+    Trajectory,
+)
+
+_MapFormat: TypeAlias = Literal["mapweave/map/1"]
+_JointFormat: TypeAlias = Literal["mapweave/joint/1"]
+MAP_FORMAT: _MapFormat = "mapweave/map/1"
+JOINT_FORMAT: _JointFormat = "mapweave/joint/1"
+
+_Count: TypeAlias = Annotated[int, Field(ge=0, le=2**53)]
+MAX_SEGMENT = 1000.0  # [m]; no lidar sees farther
+# The bound keeps sums and squares of coordinates finite; no robot drives farther.
+_Metre: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
+_Probability: TypeAlias = Annotated[float, Field(ge=0, le=1)]
+_Pose: TypeAlias = tuple[_Metre, _Metre, float]
+
+
+def _seen_at_once(segment: tuple[float, float, float, float]) -> tuple[float, ...]:
+    x1, y1, x2, y2 = segment
+    if math.hypot(x2 - x1, y2 - y1) > MAX_SEGMENT:
+        raise ValueError(f"expected a segment of at most {MAX_SEGMENT:g} m")
+    return segment
+
+
+_Segment: TypeAlias = Annotated[
+    tuple[_Metre, _Metre, _Metre, _Metre], AfterValidator(_seen_at_once)
+]
+_Polyline: TypeAlias = Annotated[list[_Segment], Field(min_length=1)]
+_Polygon: TypeAlias = Annotated[list[tuple[_Metre, _Metre]], Field(min_length=3)]
+_TrajectoryRow: TypeAlias = tuple[_Count, float | None, _Metre, _Metre, float]
+_Deviation: TypeAlias = Annotated[float, Field(ge=0, le=1e6)]
+_UncertaintyRow: TypeAlias = tuple[_Deviation, _Deviation, _Deviation, float]
+_Fact: TypeAlias = int | float | str | bool | list[float] | dict[str, float | None] | None
+_RobotId: TypeAlias = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
+_ComponentName: TypeAlias = Annotated[
+    str, StringConstraints(pattern=ID_PATTERN.removesuffix("$") + "/[0-9]{1,9}$")
+]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True, extra="ignore", allow_inf_nan=False)
+
+
+class _LinesFile(_Model):
+    """What submaps and joint components have in common."""
+
+    polylines: list[_Polyline]
+    support: list[list[_Count]]
+
+    @model_validator(mode="after")
+    def _support_fits(self) -> "_LinesFile":
+        _check_nesting("support", self.support, self.polylines)
+        return self
+
+    def line_map(self, free_space: Sequence[Sequence[tuple[float, float]]]) -> LineMap:
+        lengths = [len(polyline) for polyline in self.polylines]
+        return LineMap(
+            segments=np.array(_flat(self.polylines), dtype=np.float64).reshape(-1, 4),
+            polyline=np.repeat(np.arange(len(lengths), dtype=np.int64), lengths),
+            support=np.array(_flat(self.support), dtype=np.int64),
+            free_space=tuple(np.array(polygon, dtype=np.float64) for polygon in free_space),
+        )
+
+
+class HeaderFile(_Model):
+    """What both kinds of file start with: enough to tell which of them it is."""
+
+    format: Literal["mapweave/map/1", "mapweave/joint/1"]
+
+
+class SubmapFile(_LinesFile):
+    """One of the ``submaps`` of a map file."""
+
+    id: _Count
+    component: _Count
+    pose: _Pose
+    free_space: list[_Polygon]
+    trajectory: list[_TrajectoryRow]
+    uncertainty: list[_UncertaintyRow] | None = None
+
+    @model_validator(mode="after")
+    def _uncertainty_fits(self) -> "SubmapFile":
+        if self.uncertainty is not None and len(self.uncertainty) != len(self.trajectory):
+            raise ValueError(
+                f"uncertainty has {len(self.uncertainty)} rows,"
+                f" expected {len(self.trajectory)} as in trajectory"
+            )
+        return self
+
+    def to_submap(self) -> Submap:
+        """Return it as the library's value."""
+        lines = self.line_map(self.free_space)
+        return Submap(self.id, self.component, np.array(self.pose), lines, self._trajectory())
+
+    def _trajectory(self) -> Trajectory:
+        rows = self.trajectory
+        return Trajectory(
+            scan_index=np.array([row[0] for row in rows], dtype=np.int64),
+            stamp=np.array([_unknown_as_nan(row[1]) for row in rows], dtype=np.float64),
+            pose=np.array([row[2:] for row in rows], dtype=np.float64).reshape(-1, 3),
+            uncertainty=self._uncertainty(),
+        )
+
+    def _uncertainty(self) -> FloatArray | None:
+        if self.uncertainty is None:
+            return None
+        return np.array(self.uncertainty, dtype=np.float64).reshape(-1, 4)
+
+
+class MapFile(_Model):
+    """A whole ``MAP.json``."""
+
+    format: _MapFormat
+    robot: _RobotId
+    boot: str
+    version: _Count
+    submaps: list[SubmapFile]
+
+    @model_validator(mode="after")
+    def _ids_ascend(self) -> "MapFile":
+        ids = [submap.id for submap in self.submaps]
+        if ids != sorted(set(ids)):
+            raise ValueError("the ids of submaps should ascend, each used once")
+        return self
+
+    def to_map(self) -> RobotMap:
+        """Return it as the library's value."""
+        submaps = tuple(submap.to_submap() for submap in self.submaps)
+        return RobotMap(self.robot, self.boot, self.version, submaps)
+
+
+class RunnerUpFile(_Model):
+    """The ``runner_up`` of an alignment: a transform, and whatever is known of it."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, _Fact]
+
+    transform: _Pose
+
+
+class AlignmentFile(_Model):
+    """One of the ``alignments`` of a joint map file."""
+
+    reference: _ComponentName
+    other: _ComponentName
+    transform: _Pose
+    confidence: _Probability
+    decision: Decision
+    reason: str
+    evidence: dict[str, float | None]
+    runner_up: RunnerUpFile | None
+
+    def to_alignment(self) -> Alignment:
+        """Return it as the library's value."""
+        return Alignment(
+            reference=self.reference,
+            other=self.other,
+            transform=np.array(self.transform),
+            decision=self.decision,
+            confidence=self.confidence,
+            reason=self.reason,
+            evidence={name: _unknown_as_nan(value) for name, value in self.evidence.items()},
+            runner_up=None if self.runner_up is None else self.runner_up.model_dump(mode="json"),
+        )
+
+
+class ComponentFile(_LinesFile):
+    """One of the ``components`` of a joint map file."""
+
+    robots: Annotated[dict[_ComponentName, _Pose], Field(min_length=1)]
+    confidence: _Probability
+    segment_confidence: list[list[_Probability]]
+    free_space: list[_Polygon] = []
+
+    @model_validator(mode="after")
+    def _confidence_fits(self) -> "ComponentFile":
+        _check_nesting("segment_confidence", self.segment_confidence, self.polylines)
+        return self
+
+    def to_component(self) -> JointComponent:
+        """Return it as the library's value."""
+        return JointComponent(
+            robots={name: np.array(pose) for name, pose in self.robots.items()},
+            confidence=self.confidence,
+            map=self.line_map(self.free_space),
+            segment_confidence=np.array(_flat(self.segment_confidence), dtype=np.float64),
+        )
+
+
+class JointFile(_Model):
+    """A whole ``JOINT.json``."""
+
+    format: _JointFormat
+    version: _Count
+    alignments: list[AlignmentFile]
+    components: list[ComponentFile]
+
+    def to_map(self) -> JointMap:
+        """Return it as the library's value."""
+        return JointMap(
+            version=self.version,
+            components=tuple(component.to_component() for component in self.components),
+            alignments=tuple(alignment.to_alignment() for alignment in self.alignments),
+        )
+
+
+def _check_nesting(
+    name: str, values: Sequence[Sequence[float]], polylines: Sequence[Sequence[_Segment]]
+) -> None:
+    """Raise `ValueError` unless `values` holds one number for each segment, nested alike."""
+    found, expected = [len(row) for row in values], [len(polyline) for polyline in polylines]
+    if len(found) != len(expected):
+        raise ValueError(f"{name} has {len(found)} lists, expected {len(expected)} as in polylines")
+    for row, (count, wanted) in enumerate(zip(found, expected, strict=True)):
+        if count != wanted:
+            raise ValueError(
+                f"{name}[{row}] has {count} numbers, expected {wanted} as in polylines[{row}]"
+            )
+
+
+def _flat(rows: Sequence[Sequence[object]]) -> list[object]:
+    return [value for row in rows for value in row]
+
+
+def _unknown_as_nan(value: float | None) -> float:
+    return np.nan if value is None else value

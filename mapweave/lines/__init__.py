@@ -1,0 +1,1 @@
+"""Many sightings to few lines (paper, V to VII)."""

@@ -1,0 +1,99 @@
+"""The fewest segments that explain what was seen: always the one next that explains the most.
+
+Merging (paper, VI) leaves one segment for each surface, and one for each crumb besides; averaging
+also moves a few off what they stand for. So a map is chosen: among the merged segments and those
+they were merged from, the one that explains most of the evidence left comes next, until none is
+worth its price. This greedy choice is the classic approximation of set cover. A segment that lies
+close in front of or behind a chosen one, seen from the same side, is the same wall: it explains
+nothing more, which is why no wall is doubled.
+"""
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from scipy.sparse import csr_array
+
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.lines.sightings import Nearness, Sightings
+
+
+class SelectionParameters(BaseModel):
+    """What a segment explains, and what it must be worth."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    tolerance: float = Field(
+        0.09, gt=0, description="[m] within which a segment explains what was seen"
+    )
+    min_cosine: float = Field(
+        -0.5,
+        ge=-1,
+        le=1,
+        description="of directions: a segment explains the steps across it, as a face's roughness,"
+        " but never the opposite face",
+    )
+    shadow: float = Field(
+        0.3, ge=0, description="[m] in front of and behind a wall, where the same face is no other"
+    )
+    parallel: float = Field(
+        np.deg2rad(20.0), gt=0, description="[rad] within which faces are the same in its shadow"
+    )
+    price: float = Field(
+        0.11,
+        ge=0,
+        description="[m] of wall, seen as often as the map's wall is on average, that a segment"
+        " must explain beyond what the others do",
+    )
+
+
+def select(
+    candidates: FloatArray, evidence: Sightings, price: float, parameters: SelectionParameters
+) -> IntArray:
+    """Return which of (n, 4) `candidates` [m] to keep, the one that explains most first.
+
+    `price` is the weight of evidence [m] below which none is kept.
+    """
+    near = Nearness.of(
+        candidates,
+        evidence.points,
+        evidence.directions,
+        max(parameters.tolerance, parameters.shadow),
+    )
+    explains = explained(near, parameters)
+    settled = explains | shadowed(near, parameters)
+    # What a segment denies, being close in front of or behind it, counts against it.
+    worth = csr_array(
+        (
+            np.where(explains, 1.0, -1.0)[settled],
+            (near.segment[settled], near.sample[settled]),
+        ),
+        shape=(len(candidates), len(evidence)),
+    )
+    return _greedily(worth, evidence.weights, price)
+
+
+def explained(near: Nearness, parameters: SelectionParameters) -> BoolArray:
+    """Return (k,) which pairs are of a segment and what it explains."""
+    return np.asarray(
+        (near.distance <= parameters.tolerance) & (near.cosine >= parameters.min_cosine)
+    )
+
+
+def shadowed(near: Nearness, parameters: SelectionParameters) -> BoolArray:
+    """Return (k,) which pairs are of a segment and the same face close before or behind it."""
+    inside = near.distance <= np.abs(near.across) + 1e-9
+    same = near.cosine >= np.cos(parameters.parallel)
+    return np.asarray(inside & same & (np.abs(near.across) <= parameters.shadow))
+
+
+def _greedily(worth: csr_array, weights: FloatArray, price: float) -> IntArray:
+    """Take the row of the greatest worth, drop the columns it settles, and again."""
+    of_sample = worth.T.tocsr()
+    left = weights.copy()
+    gain = worth @ left
+    chosen: list[int] = []
+    while len(gain) and gain[best := int(np.argmax(gain))] > price:
+        chosen.append(best)
+        samples = worth.indices[worth.indptr[best] : worth.indptr[best + 1]]
+        gain -= of_sample[samples].T @ left[samples]
+        left[samples] = 0.0
+    return np.array(chosen, dtype=np.int64)

@@ -1,0 +1,132 @@
+"""What a map has to explain: samples of all sightings, each with how much was seen there.
+
+A line map is judged by the returns it explains. The returns are gone when maps are merged, but
+their sightings stand for them: a segment seen by 30 scans is 30 times its length of wall seen.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from mapweave.geometry.arrays import FloatArray, IntArray
+
+DIRECTION_BINS = 24  # of a full turn: sightings 15° apart are gathered
+
+
+class Samples(NamedTuple):
+    """Points along segments: (n, 2) points and unit directions, (n,) metres each stands for."""
+
+    points: FloatArray
+    directions: FloatArray
+    lengths: FloatArray
+    owner: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sightings:
+    """Samples of sightings in one frame.
+
+    Attributes
+    ----------
+    points
+        (n, 2) [m].
+    directions
+        (n, 2) unit vectors along the sighting, its visible side on the left.
+    weights
+        (n,) the wall seen there [m], counted as often as it was seen.
+    spacing
+        [m] along a sighting that a sample stands for at most.
+    """
+
+    points: FloatArray
+    directions: FloatArray
+    weights: FloatArray
+    spacing: float
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.points)
+
+    @classmethod
+    def of(cls, segments: FloatArray, counts: FloatArray | IntArray, spacing: float) -> "Sightings":
+        """Sample (n, 4) `segments` [m], each seen (n,) `counts` times, every `spacing` [m]."""
+        samples = sample(segments, spacing)
+        weights = np.asarray(counts[samples.owner] * samples.lengths, dtype=np.float64)
+        return cls(samples.points, samples.directions, weights, spacing)
+
+    def gathered(self) -> "Sightings":
+        """Return the same evidence in fewer samples: the mean of those that hardly differ."""
+        cells = np.floor(self.points / (self.spacing / 2)).astype(np.int64)
+        turn = np.arctan2(self.directions[:, 1], self.directions[:, 0]) / (2 * np.pi)
+        bins = np.floor(turn * DIRECTION_BINS).astype(np.int64) % DIRECTION_BINS
+        low = cells.min(axis=0, initial=0)
+        i, j = (cells - low).T
+        _, group = np.unique(
+            (i * (j.max(initial=0) + 1) + j) * DIRECTION_BINS + bins, return_inverse=True
+        )
+        weights = np.bincount(group, self.weights).astype(np.float64)
+        points, directions = (
+            np.column_stack([np.bincount(group, self.weights * x) / weights for x in rows.T])
+            for rows in (self.points, self.directions)
+        )
+        directions /= np.hypot(*directions.T)[:, None]
+        return Sightings(points, directions, weights, self.spacing)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearness:
+    """Which samples are near which segments, and how they lie to them; k pairs.
+
+    Attributes
+    ----------
+    segment, sample
+        (k,) indices.
+    along, across
+        (k,) the sample's place along the segment from its start, and to its left [m].
+    distance
+        (k,) from the segment [m].
+    cosine
+        (k,) of the angle between both directions: 1 for the same face, -1 for the opposite one.
+    """
+
+    segment: IntArray
+    sample: IntArray
+    along: FloatArray
+    across: FloatArray
+    distance: FloatArray
+    cosine: FloatArray
+
+    @classmethod
+    def of(
+        cls, segments: FloatArray, points: FloatArray, directions: FloatArray, reach: float
+    ) -> "Nearness":
+        """Pair (n, 4) `segments` [m] with the (m, 2) `points` within `reach` [m] of them."""
+        tree = shapely.STRtree(shapely.points(points))
+        lines = shapely.linestrings(segments.reshape(-1, 2, 2))
+        segment, sample = tree.query(lines, predicate="dwithin", distance=reach)
+        own, lengths = units(segments)
+        (u, v), (x, y) = own[segment].T, (points[sample] - segments[segment, :2]).T
+        along, across = u * x + v * y, u * y - v * x
+        beyond = np.maximum(np.maximum(-along, along - lengths[segment]), 0.0)
+        cosine = (own[segment] * directions[sample]).sum(axis=1)
+        return cls(segment, sample, along, across, np.hypot(across, beyond), cosine)
+
+
+def sample(segments: FloatArray, spacing: float) -> Samples:
+    """Return points in the middle of equal parts, `spacing` [m] at most, of (n, 4) `segments`."""
+    directions, lengths = units(segments)
+    counts = np.maximum(1, np.ceil(lengths / spacing)).astype(np.int64)
+    owner = np.repeat(np.arange(len(segments)), counts)
+    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = (lengths / counts)[owner]
+    points = segments[owner, :2] + ((rank + 0.5) * part)[:, None] * directions[owner]
+    return Samples(points, directions[owner], part, owner)
+
+
+def units(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (n, 2) unit directions and (n,) lengths [m] of (n, 4) `segments`."""
+    vectors = segments[:, 2:] - segments[:, :2]
+    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
+    return vectors / np.maximum(lengths, 1e-12)[:, None], lengths

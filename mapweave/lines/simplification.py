@@ -1,0 +1,156 @@
+"""The simplest map of what was seen: merged, placed, chosen, and its ends joined.
+
+The paper merges until no pair is cheap enough (VI); what remains is its map. Here merging only
+proposes walls. Which of them are kept, where they lie and where they end is decided by all that
+was seen, so that few segments explain nearly all of it.
+"""
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from shapely.geometry.base import BaseGeometry
+
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.lines.collinear_junctions import StraighteningParameters, straighten
+from mapweave.lines.corner_junctions import JoiningParameters, join_corners
+from mapweave.lines.directions import main_directions
+from mapweave.lines.fitting import FittingParameters, cut, fit, follow, trim
+from mapweave.lines.merging import MergingParameters, evolve
+from mapweave.lines.selection import SelectionParameters, explained, select, shadowed
+from mapweave.lines.sightings import Nearness, Sightings, sample, units
+from mapweave.lines.t_junctions import WallEndParameters, meet_walls
+
+
+class SimplificationParameters(BaseModel):
+    """One model for each step."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    spacing: float = Field(0.1, gt=0, description="[m] between samples of what was seen")
+    missed: float = Field(
+        0.5, gt=0, le=1, description="share of a sighting; less explained, it proposes walls anew"
+    )
+    min_length: float = Field(0.15, ge=0, description="[m] shorter segments are no walls")
+    merging: MergingParameters = MergingParameters()
+    placement: FittingParameters = FittingParameters()
+    selection: SelectionParameters = SelectionParameters()
+    straightening: StraighteningParameters = StraighteningParameters()
+    joining: JoiningParameters = JoiningParameters()
+    wall_ends: WallEndParameters = WallEndParameters()
+
+
+def simplify(
+    merged: FloatArray,
+    sightings: FloatArray,
+    counts: IntArray,
+    free: BaseGeometry,
+    parameters: SimplificationParameters | None = None,
+) -> FloatArray:
+    """Return the fewest segments that explain nearly all that was seen.
+
+    Parameters
+    ----------
+    merged
+        (n, 4) [m], directed: what merging left (paper, VI).
+    sightings
+        (k, 4) [m], the same frame: what it was merged from.
+    counts
+        (k,) how many scans each sighting stands for.
+    free
+        What was seen through: no wall grows into it.
+    parameters
+        Of each step.
+
+    Returns
+    -------
+    FloatArray
+        (m, 4) [m], directed, the one that explains most first.
+    """
+    p = parameters or SimplificationParameters()
+    if not len(merged):
+        return np.empty((0, 4))
+    evidence = Sightings.of(sightings, counts, p.spacing).gathered()
+    price = p.selection.price * evidence.weights.sum() / max(_wall(merged), 1e-9)
+    _, lengths = units(sightings)
+    directions = main_directions(sightings, lengths * counts, p.merging.directions)
+    candidates = _placed(merged, evidence, directions, free, p)
+    chosen = candidates[select(candidates, evidence, price, p.selection)]
+    missed = _missed(chosen, sightings, p)
+    if missed.any():
+        again = _proposed_again(sightings[missed], counts[missed], p)
+        candidates = np.concatenate([candidates, _placed(again, evidence, directions, free, p)])
+        chosen = candidates[select(candidates, evidence, price, p.selection)]
+    walls = straighten(_trimmed(chosen, evidence, p), free, p.straightening)
+    return meet_walls(join_corners(walls, free, p.joining), free, p.wall_ends)
+
+
+def sources(segments: FloatArray, sightings: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return pairs of a segment and a sighting of it: most of the one lies along the other.
+
+    Parameters
+    ----------
+    segments, sightings
+        (n, 4) and (k, 4) [m], one frame.
+    """
+    p = SimplificationParameters()
+    points, directions, lengths, owner = sample(sightings, 2 * p.spacing)
+    near = Nearness.of(segments, points, directions, p.placement.tolerance)
+    along = np.flatnonzero(near.cosine >= np.cos(p.placement.parallel))
+    segment, source = near.segment[along], owner[near.sample[along]]
+    pairs, place = np.unique(np.column_stack([segment, source]), axis=0, return_inverse=True)
+    shared = np.bincount(place.ravel(), lengths[near.sample[along]], minlength=len(pairs))
+    _, wall = units(segments)
+    _, seen = units(sightings)
+    enough = shared >= np.minimum(wall[pairs[:, 0]], seen[pairs[:, 1]]) / 2
+    return pairs[enough, 0], pairs[enough, 1]
+
+
+def _placed(
+    segments: FloatArray,
+    evidence: Sightings,
+    directions: FloatArray,
+    free: BaseGeometry,
+    p: SimplificationParameters,
+) -> FloatArray:
+    """Return the parts of `segments` that lie where most was seen, in main directions if near."""
+    fitted = fit(segments, evidence, p.placement)
+    straight = follow(fitted, directions, p.merging.direction_tolerance, p.merging.max_shift)
+    placed = cut(straight, evidence, free, p.placement)
+    return placed[_is_long(placed, p)]
+
+
+def _proposed_again(
+    sightings: FloatArray, counts: IntArray, p: SimplificationParameters
+) -> FloatArray:
+    """Merge (paper, VI) what the chosen do not explain: apart from them it may show walls."""
+    _, lengths = units(sightings)
+    merged = evolve(sightings, lengths * counts, p.merging).segments
+    return merged[_is_long(merged, p)]
+
+
+def _missed(chosen: FloatArray, sightings: FloatArray, p: SimplificationParameters) -> BoolArray:
+    """Return (k,) which sightings the chosen explain too little of."""
+    points, directions, lengths, owner = sample(sightings, 2 * p.spacing)
+    near = Nearness.of(chosen, points, directions, p.selection.tolerance)
+    known = np.zeros(len(points), dtype=np.bool_)
+    known[near.sample[explained(near, p.selection)]] = True
+    total = np.bincount(owner, lengths, minlength=len(sightings))
+    share = np.bincount(owner, lengths * known, minlength=len(sightings))
+    return np.asarray(share < p.missed * total)
+
+
+def _trimmed(chosen: FloatArray, evidence: Sightings, p: SimplificationParameters) -> FloatArray:
+    """Return the `chosen` without what an earlier one stands for already."""
+    near = Nearness.of(chosen, evidence.points, evidence.directions, p.selection.shadow)
+    explains = explained(near, p.selection)
+    settles = explains | shadowed(near, p.selection)
+    trimmed = trim(chosen, near, explains, settles, evidence)
+    return trimmed[_is_long(trimmed, p)]
+
+
+def _is_long(segments: FloatArray, p: SimplificationParameters) -> BoolArray:
+    _, lengths = units(segments)
+    return np.asarray(lengths >= p.min_length)
+
+
+def _wall(segments: FloatArray) -> float:
+    return float(units(segments)[1].sum())

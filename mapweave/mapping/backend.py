@@ -1,0 +1,237 @@
+"""Settling: what becomes of a submap once it is finished, beside the tracking of the next.
+
+Its component is joined to an older one where shapes prove it, loops are closed, its scans are
+refined against each other and against the walls that they saw again, and merged once more along
+the better poses. The mapper adopts the outcome when the next submap is finished, at a defined
+scan, so a log gives the same map however long settling takes and wherever it runs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.mapping.component_merging import ComponentMerger, ComponentMergingParameters
+from mapweave.mapping.kidnap_detection import KidnapDetectionParameters, KidnapDetector, Kidnapping
+from mapweave.mapping.loop_closing import LoopCloser, LoopParameters
+from mapweave.mapping.submap_builder import SubmapBuilder, SubmapParameters
+from mapweave.mapping.tracking.observation import Observation
+from mapweave.mapping.tracking.pose_covariance import EXACT
+from mapweave.maps import LineMap, Submap, Trajectory
+from mapweave.matching.multiview_icp import MultiviewIcpParameters, refine
+from mapweave.scan.points import OrientedPoints, join_points, points_on_lines
+
+
+class BackendParameters(BaseModel):
+    """One model for each stage."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    submap: SubmapParameters = SubmapParameters()
+    component_merging: ComponentMergingParameters = ComponentMergingParameters()
+    loops: LoopParameters = LoopParameters()
+    kidnapping: KidnapDetectionParameters = KidnapDetectionParameters()
+    refinement: MultiviewIcpParameters = MultiviewIcpParameters()
+    spacing: float = Field(0.1, gt=0, description="[m] between points on older walls")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FinishedSubmap:
+    """A submap as tracking left it.
+
+    Attributes
+    ----------
+    submap
+        The newest; its id is the count of those before it.
+    scans
+        The scans of its trajectory, in that order.
+    follows
+        Whether it was tracked from the submap before it.
+    spare
+        The number of a component, if another one is needed.
+    """
+
+    submap: Submap
+    scans: tuple[Observation, ...]
+    follows: bool
+    spare: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BackendResult:
+    """Where everything is, now that the newest submap is settled.
+
+    Attributes
+    ----------
+    component
+        (n,) of each submap.
+    pose
+        (n, 3) of each submap in its component's frame [m, m, rad].
+    renewed
+        The last submap, its scans refined and merged again; in two where it was found that the
+        robot jumped meanwhile.
+    newest_component
+        The highest number of a component that was used, joined since or not.
+    """
+
+    component: IntArray
+    pose: FloatArray
+    renewed: tuple[Submap, ...]
+    newest_component: int
+
+    def applied(self, submaps: Sequence[Submap]) -> list[Submap]:
+        """Return `submaps`, those settled so far, at their new poses."""
+        *older, _ = submaps
+        count = len(older)
+        placed = [
+            replace(s, component=component, pose=pose)
+            for s, component, pose in zip(
+                older, self.component[:count].tolist(), self.pose[:count], strict=True
+            )
+        ]
+        return [*placed, *self.renewed]
+
+
+class BackendRunner(Protocol):
+    """Settles one submap at a time, here or in another process."""
+
+    def begin(self, finished: FinishedSubmap) -> None:
+        """Take the next submap; the outcome of the one before must have been taken."""
+
+    def take(self) -> BackendResult | None:
+        """Wait for the outcome and return it; None if there is none."""
+
+
+class Backend:
+    """Settles at once, where it is called."""
+
+    def __init__(self, parameters: BackendParameters) -> None:
+        self._parameters = parameters
+        self._submaps: list[Submap] = []
+        self._component_merger = ComponentMerger(parameters.component_merging)
+        self._loops = LoopCloser(parameters.loops)
+        self._kidnap_detector = KidnapDetector(parameters.kidnapping)
+        self._tracked = 0  # how many of the last submaps were tracked from one another
+        self._settled: BackendResult | None = None
+
+    def begin(self, finished: FinishedSubmap) -> None:
+        """Settle the next submap."""
+        self._settled = self.settle(finished)
+
+    def take(self) -> BackendResult | None:
+        """Return the outcome."""
+        return self._settled
+
+    def settle(self, finished: FinishedSubmap) -> BackendResult:
+        """Join, close, refine and merge again."""
+        count = len(self._submaps)
+        submaps = [*self._submaps, finished.submap]
+        if finished.follows and count:
+            self._loops.graph.track(submaps[-2], submaps[-1])
+        self._tracked = self._tracked + 1 if finished.follows else 1
+        compared = self._loops.compare(submaps)
+        oriented = [seen.oriented for seen in finished.scans]
+        at = self._kidnap_detector.find(submaps, oriented, compared, finished.follows and count > 0)
+        parts = [(finished.submap, finished.scans)]
+        if at is not None:
+            parts = _cut(finished, at, self._parameters.submap)
+            submaps = self._departed(submaps, at, [part for part, _ in parts])
+            self._tracked = submaps[-1].id - at.submap + 1 if len(parts) == 1 else 1
+        submaps, joints = self._component_merger.reunite(submaps, self._tracked)
+        for older, younger in joints:
+            self._loops.graph.join(submaps[older], submaps[younger])
+        if joints or at is not None:
+            self._kidnap_detector.forget()
+        submaps = self._loops.close(submaps, compared if at is None and not joints else None)
+        renewed = [
+            self._refined(submaps, submaps[count + k], scans) for k, (_, scans) in enumerate(parts)
+        ]
+        self._submaps = [*submaps[:count], *renewed]
+        component = np.array([s.component for s in self._submaps])
+        poses = np.array([s.pose for s in self._submaps])
+        newest = finished.submap.component if at is None else finished.spare
+        return BackendResult(component, poses, tuple(renewed), newest)
+
+    def _departed(
+        self, submaps: Sequence[Submap], at: Kidnapping, parts: Sequence[Submap]
+    ) -> list[Submap]:
+        """Return `submaps`, the last in `parts`: none of those from `at` on is tracked to there."""
+        *older, _ = submaps
+        if len(parts) == 2:
+            return [*self._loops.close([*older, parts[0]]), parts[1]]
+        kept = self._loops.graph.part(submaps, at.submap)
+        component = parts[0].component
+        gone = [replace(s, component=component) for s in older[at.submap :]]
+        return [*kept, *gone, *parts]
+
+    def _refined(
+        self, submaps: Sequence[Submap], newest: Submap, scans: Sequence[Observation]
+    ) -> Submap:
+        """Refine `newest` against those of `submaps` it is linked with, and merge it again."""
+        p = self._parameters
+        linked = [submaps[k] for k in self._loops.graph.neighbours(newest.id)]
+        poses = refine(
+            [seen.oriented for seen in scans],
+            newest.trajectory.pose,
+            _walls(linked, newest.pose, p.spacing),
+            p.refinement,
+        )
+        growing = _merged(scans, poses, newest.trajectory.uncertainty, p.submap)
+        return replace(newest, map=growing.line_map(), trajectory=growing.trajectory())
+
+
+def _cut(
+    finished: FinishedSubmap, at: Kidnapping, parameters: SubmapParameters
+) -> list[tuple[Submap, tuple[Observation, ...]]]:
+    """Return the parts of a submap before and from `at` on, each with its scans.
+
+    The latter is in a component anew; the former is left out where it is empty.
+    """
+    submap, scans = finished.submap, finished.scans
+    if at.submap < submap.id or at.scan == 0:
+        return [(replace(submap, component=finished.spare), scans)]
+    numbers = (submap.id, submap.component), (submap.id + 1, finished.spare)
+    spans = slice(at.scan), slice(at.scan, None)
+    parts = []
+    for (number, component), span in zip(numbers, spans, strict=True):
+        path = _part(submap.trajectory, span)
+        lines = _merged(scans[span], path.pose, path.uncertainty, parameters).line_map()
+        part = replace(submap, id=number, component=component, map=lines, trajectory=path)
+        parts.append((part, scans[span]))
+    return parts
+
+
+def _part(trajectory: Trajectory, chosen: slice) -> Trajectory:
+    held = trajectory.uncertainty
+    return Trajectory(
+        trajectory.scan_index[chosen],
+        trajectory.stamp[chosen],
+        trajectory.pose[chosen],
+        None if held is None else held[chosen],
+    )
+
+
+def _merged(
+    scans: Sequence[Observation],
+    poses: FloatArray,
+    uncertainty: FloatArray | None,
+    parameters: SubmapParameters,
+) -> SubmapBuilder:
+    """Merge `scans` at (n, 3) `poses`, of which (n, 4) `uncertainty` is known, or none."""
+    growing = SubmapBuilder(parameters)
+    known = np.tile(EXACT, (len(poses), 1)) if uncertainty is None else uncertainty
+    for seen, pose, each in zip(scans, poses, known, strict=True):
+        growing.add(seen.scan, seen.lines.segments, pose, each)
+    return growing
+
+
+def _walls(submaps: Sequence[Submap], frame: FloatArray, spacing: float) -> OrientedPoints:
+    """Return points about every `spacing` [m] on the walls of `submaps`, in `frame` (3,)."""
+    oriented = [
+        points_on_lines(s.map, spacing)[0].moved(se2.between(frame, s.pose)) for s in submaps
+    ]
+    return join_points([points_on_lines(LineMap.empty(), spacing)[0], *oriented])

@@ -1,0 +1,279 @@
+"""Lost and found: a robot's components are joined as soon as their shapes prove it (paper, II).
+
+By the means by which two robots' maps are joined: a component is a map like any other. But most
+robots that lost track were not carried away. Where the shapes leave it open, a component is looked
+for where the robot was when it lost track of the one before; what both saw decides as ever.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby, pairwise
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.assembly import lines_of
+from mapweave.fusion.align import FusionParameters, compare, prepare
+from mapweave.fusion.decision import DecisionParameters
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.mapping.place_recognition import PlaceRecognitionParameters, PlaceRecognizer
+from mapweave.maps import Alignment, Submap
+from mapweave.matching.hypotheses import PreparedMap
+
+
+class ComponentMergingParameters(BaseModel):
+    """When components are compared, and where a robot that lost track is looked for."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    # Nothing undoes a join within a robot's map, so a shape is asked for, not straight walls alone.
+    fusion: FusionParameters = FusionParameters(decision=DecisionParameters(plain_held=math.inf))
+    place_recognition: PlaceRecognitionParameters = PlaceRecognitionParameters()
+    min_confidence: float = Field(
+        0.5,
+        gt=0,
+        lt=1,
+        description="of a place where the robot lost track: that it is there needs less proof than"
+        " that it is anywhere",
+    )
+    min_lead: float = Field(
+        0.0, ge=0, description="[m] of score before the next best place, there: its share decides"
+    )
+    growth: float = Field(
+        0.15, gt=0, description="share by which either has grown before a pair is compared again"
+    )
+    reach: float = Field(3.0, gt=0, description="[m] that a robot came while it was lost, at most")
+    max_reach: float = Field(
+        7.5, gt=0, description="[m] the same with a piece in between, its path included"
+    )
+    gaps: int = Field(
+        2, ge=1, description="between two components where it is looked for, the last"
+    )
+    step: float = Field(0.3, gt=0, description="[m] between the places tried there")
+    turn_step: float = Field(0.06, gt=0, description="[rad] between the headings tried there")
+    place: float = Field(2.0, gt=0, description="[m] within which the middles of submaps are alike")
+    visits: int = Field(
+        3, ge=1, description="submaps of a place that are compared, the last; more tell little more"
+    )
+
+
+class ComponentMerger:
+    """Remembers what it compared: a pair that was refused is asked again when it has grown."""
+
+    def __init__(self, parameters: ComponentMergingParameters | None = None) -> None:
+        self._p = parameters or ComponentMergingParameters()
+        self._compared: dict[tuple[int, int], tuple[float, float]] = {}
+        self._shapes: dict[int, tuple[object, PreparedMap | None]] = {}
+        self._place_recognizer = PlaceRecognizer(self._p.place_recognition, self._p.fusion)
+
+    def reunite(
+        self, submaps: Sequence[Submap], tracked: int = 1
+    ) -> tuple[list[Submap], list[tuple[int, int]]]:
+        """Join components where the shapes prove it: the younger one becomes a part of the older.
+
+        Parameters
+        ----------
+        submaps
+            In the order in which they were seen.
+        tracked
+            How many of the last ones were tracked from one another.
+
+        Returns
+        -------
+        submaps
+            In the same order, with their new components and poses.
+        joints
+            For each join, the ids of a submap of the older and one of the younger component:
+            those that are nearest where the shapes were compared, because what tracking did to the
+            rest of either component is not the join's.
+        """
+        joined = list(submaps)
+        joints: list[tuple[int, int]] = []
+        for younger in sorted({s.component for s in submaps})[1:]:
+            for older in sorted({s.component for s in joined if s.component < younger}):
+                after = self._joined(joined, older, younger)
+                if after is not None:
+                    of_younger = {s.id for s in joined if s.component == younger}
+                    joints.append(_nearest(after, older, of_younger))
+                    joined = after
+                    break
+        if not joints:
+            joined, joints = self._recognised(joined, tracked)
+        if joints:
+            self._place_recognizer.forget()
+        return joined, joints
+
+    def _recognised(
+        self, submaps: list[Submap], tracked: int
+    ) -> tuple[list[Submap], list[tuple[int, int]]]:
+        """Join the component of the newest submap with another one where it is found in it."""
+        part = submaps[-tracked:]
+        found = self._place_recognizer.look(submaps, part, lambda c: self._shape(submaps, c))
+        if found is None:
+            return submaps, []
+        newest = submaps[-1]
+        here, there = newest.component, found.component
+        if here < there:
+            joined = self._moved(submaps, here, there, se2.inverse(found.transform))
+        else:
+            joined = self._moved(submaps, there, here, found.transform)
+        of_there = {s.id for s in submaps if s.component == there}
+        nearest = _nearest_to(newest.id, joined, of_there)
+        return joined, [(newest.id, nearest) if here < there else (nearest, newest.id)]
+
+    def _moved(
+        self, submaps: Sequence[Submap], older: int, younger: int, transform: FloatArray
+    ) -> list[Submap]:
+        """Return `submaps`, those of `younger` in `older`, to which `transform` (3,) takes them."""
+        self._shapes.pop(younger, None)
+        return [
+            replace(s, component=older, pose=se2.compose(transform, s.pose))
+            if s.component == younger
+            else s
+            for s in submaps
+        ]
+
+    def _joined(self, submaps: Sequence[Submap], older: int, younger: int) -> list[Submap] | None:
+        """Return `submaps` with two components as one, where their shapes prove it."""
+        walls = _wall(submaps, older), _wall(submaps, younger)
+        if not self._is_due((older, younger), walls):
+            return None
+        self._compared[older, younger] = walls
+        alignment = self._compare(submaps, older, younger)
+        if alignment.decision != "accepted":
+            return None
+        return self._moved(submaps, older, younger, alignment.transform)
+
+    def _compare(self, submaps: Sequence[Submap], older: int, younger: int) -> Alignment:
+        """Compare two components: by shape, and where that leaves it open, where track was lost."""
+        first, second = self._shape(submaps, older), self._shape(submaps, younger)
+        names, p = ("older", "younger"), self._p
+        anywhere = compare(names[0], first, names[1], second, p.fusion)
+        possible = _between_them(submaps, older, younger, p)
+        if anywhere.decision == "accepted" or len(possible) == 0:
+            return anywhere
+        proof = {"min_confidence": p.min_confidence, "min_lead": p.min_lead}
+        expected = p.fusion.model_copy(
+            update={"decision": p.fusion.decision.model_copy(update=proof)}
+        )
+        here = compare(names[0], first, names[1], second, expected, possible)
+        # A better place elsewhere says that it was carried away.
+        best = max(anywhere.evidence.get("score", 0.0), 0.0)
+        return here if here.evidence.get("score", 0.0) >= 0.95 * best else anywhere
+
+    def _shape(self, submaps: Sequence[Submap], component: int) -> PreparedMap | None:
+        """Prepare a component, unless it is as it was the last time."""
+        inside = _covering([s for s in submaps if s.component == component], self._p)
+        now = tuple((s.map, s.pose.tobytes()) for s in inside)
+        known, shape = self._shapes.get(component, (None, None))
+        if known != now:
+            shape = prepare(lines_of(inside), self._p.fusion)
+            self._shapes[component] = now, shape
+        return shape
+
+    def _is_due(self, pair: tuple[int, int], walls: tuple[float, float]) -> bool:
+        """Whether either of a pair has notably more wall [m] than when it was compared, or less."""
+        before = self._compared.get(pair)
+        if before is None:
+            return True
+        grown = 1 + self._p.growth
+        return any(not b / grown <= w <= grown * b for w, b in zip(walls, before, strict=True))
+
+
+def _covering(inside: Sequence[Submap], p: ComponentMergingParameters) -> list[Submap]:
+    """Return the last submaps of each place: however often it was seen, a building stays as large.
+
+    In the order of `inside`.
+    """
+    kept: list[tuple[Submap, tuple[float, float]]] = []
+    for submap in reversed(inside):
+        middle = _middle(submap)
+        if sum(math.dist(middle, other) < p.place for _, other in kept) < p.visits:
+            kept.append((submap, middle))
+    return [submap for submap, _ in reversed(kept)]
+
+
+def _between_them(
+    submaps: Sequence[Submap], older: int, younger: int, p: ComponentMergingParameters
+) -> FloatArray:
+    """(n, 3) transforms from `younger` to `older` by which the robot did not leap between them.
+
+    Wherever one ended and the other is the next of the two, the last times; what it saw meanwhile
+    may be in a piece too small to be joined.
+    """
+    seen = [
+        (k, s)
+        for k, s in enumerate(submaps)
+        if s.component in (older, younger) and len(s.trajectory.pose)
+    ]
+    gaps = [(a, b) for a, b in pairwise(seen) if a[1].component != b[1].component]
+    found = [np.empty((0, 3))]
+    for (k, before), (m, after) in gaps[-p.gaps :]:
+        moves = _moves(_lost_for(submaps[k + 1 : m], p), p)
+        last, first = _pose(before, -1), _pose(after, 0)
+        if before.component == older:
+            found.append(se2.compose(se2.compose(last, moves), se2.inverse(first)))
+        else:
+            found.append(se2.compose(first, se2.compose(se2.inverse(moves), se2.inverse(last))))
+    return np.concatenate(found)
+
+
+def _lost_for(pieces: Sequence[Submap], p: ComponentMergingParameters) -> float:
+    """[m] that a robot may have come while it was lost, these pieces of its path included."""
+    count = len(list(groupby(pieces, lambda s: s.component)))
+    return p.reach * (1 + count) + sum(s.trajectory.length for s in pieces)
+
+
+def _moves(reach: float, p: ComponentMergingParameters) -> FloatArray:
+    """(n, 3) all moves of a robot that came no farther than `reach` [m, m, rad]; none beyond it."""
+    if reach > p.max_reach:
+        return np.empty((0, 3))
+    shifts = np.linspace(-reach, reach, 2 * int(np.ceil(reach / p.step)) + 1)
+    turns = np.arange(-np.pi, np.pi, p.turn_step)
+    x, y, turn = (a.ravel() for a in np.meshgrid(shifts, shifts, turns, indexing="ij"))
+    within = np.hypot(x, y) <= reach
+    moves: FloatArray = np.column_stack([x, y, turn])[within]
+    return moves
+
+
+def _pose(submap: Submap, scan: int) -> FloatArray:
+    """(3,) of one of the scans of a submap, component frame [m, m, rad]."""
+    return se2.compose(submap.pose, submap.trajectory.pose[scan])
+
+
+def _nearest(submaps: Sequence[Submap], component: int, younger: set[int]) -> tuple[int, int]:
+    """Return the ids of the nearest two submaps, one in `younger` and one that is not."""
+    inside = [(s.id, _middle(s)) for s in submaps if s.component == component]
+    _, first, second = min(
+        (math.dist(a, b), one, other)
+        for one, a in inside
+        if one not in younger
+        for other, b in inside
+        if other in younger
+    )
+    return first, second
+
+
+def _nearest_to(number: int, submaps: Sequence[Submap], others: set[int]) -> int:
+    """Return the id of that of `others` which is nearest to submap `number`."""
+    here = _middle(submaps[number])
+    return min(others, key=lambda other: math.dist(here, _middle(submaps[other])))
+
+
+def _middle(submap: Submap) -> tuple[float, float]:
+    """Middle of a submap's walls, component frame [m]; of none its frame's origin."""
+    points = submap.map.segments.reshape(-1, 2)
+    middle = points.mean(axis=0) if len(points) else np.zeros(2)
+    x, y = se2.transform_points(submap.pose, middle).tolist()
+    return x, y
+
+
+def _wall(submaps: Sequence[Submap], component: int) -> float:
+    """[m] of wall in the submaps of a component."""
+    return sum(
+        float(np.hypot(*(s.map.segments[:, 2:] - s.map.segments[:, :2]).T).sum())
+        for s in submaps
+        if s.component == component
+    )

@@ -1,0 +1,223 @@
+"""The incremental mapper: a robot's map from its raw scans (paper, V).
+
+Each scan becomes segments, is tracked, and is merged into the growing submap. A scan that fits
+nowhere waits; when several in a row fit nowhere, the robot is lost and starts a new component.
+"""
+
+from dataclasses import dataclass
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.assembly import place, unite_lines
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.ids import check_id
+from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
+from mapweave.mapping.submap_builder import SubmapBuilder
+from mapweave.mapping.tracking.acceptance import ScanMatch
+from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
+from mapweave.mapping.tracking.pose_covariance import (
+    PoseCovarianceParameters,
+    pose_uncertainty,
+    turn_uncertainty,
+)
+from mapweave.mapping.tracking.tracker import Found, Tracker, TrackerParameters
+from mapweave.maps import LineMap, RobotMap, Submap
+from mapweave.scan.scan import Scan
+
+
+class MapperParameters(BaseModel):
+    """One model for each stage."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    observation: ObservationParameters = ObservationParameters()
+    tracker: TrackerParameters = TrackerParameters()
+    uncertainty: PoseCovarianceParameters = PoseCovarianceParameters()
+    backend: BackendParameters = BackendParameters()
+    patience: int = Field(
+        5,
+        ge=1,
+        description="scans in a row that fit nowhere, or were not confirmed by the next one, before"
+        " the robot counts as lost",
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """What became of a scan.
+
+    Attributes
+    ----------
+    placed
+        Whether it is in the map; one that waits may be placed by a later call.
+    component
+        The component the robot is in now.
+    submap_finished
+        Whether this call finished a submap.
+    lost
+        Whether this call started a new component.
+    """
+
+    placed: bool
+    component: int
+    submap_finished: bool
+    lost: bool
+
+
+class Mapper:
+    """Maps the scans of one robot.
+
+    Parameters
+    ----------
+    robot, boot
+        The robot's id, and which run of it this is.
+    settling
+        Settles finished submaps with the parameters given here, as by default it is done in
+        between; the map is the same.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        boot: str = "0",
+        parameters: MapperParameters | None = None,
+        backend: BackendRunner | None = None,
+    ) -> None:
+        self.robot = check_id("robot", robot)
+        self.boot = boot
+        self.parameters = parameters or MapperParameters()
+        self._version = 0
+        self._finished: list[Submap] = []
+        self._component = self._newest_component = 0
+        self._tracker = Tracker(self.parameters.tracker)
+        self._growing = SubmapBuilder(self.parameters.backend.submap)
+        self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
+        self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
+        self._backend = backend or Backend(self.parameters.backend)
+        self._unsettled = False  # whether the last finished submap is being settled
+        self._follows = False  # whether the growing submap was tracked from the last finished one
+        self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
+
+    def add(self, scan: Scan) -> Placement:
+        """Take the next scan."""
+        seen = observe(scan, self.parameters.observation)
+        if self._tracker.is_blind(seen):
+            return Placement(False, self._component, False, False)  # blind: nothing to place
+        finished = len(self._finished)
+        lost = False
+        placed = self._place(seen)
+        if len(self._tracker.missed) >= self.parameters.patience:
+            self._start_again()
+            lost = True
+            placed = seen.scan.index in self._merged
+        return Placement(placed, self._component, len(self._finished) > finished, lost)
+
+    def finish(self) -> RobotMap:
+        """Finish the growing submap, as at the end of a log, and return the map."""
+        self._merge_all(self._tracker.settle())
+        if not self._growing.is_empty:
+            self._finish_submap()
+        self._adopt_settled()
+        return self.robot_map()
+
+    def robot_map(self) -> RobotMap:
+        """Return the finished submaps and the growing one."""
+        growing = [] if self._growing.is_empty else [self._submap()]
+        return RobotMap(self.robot, self.boot, self._version, (*self._finished, *growing))
+
+    def _place(self, seen: Observation) -> bool:
+        """Follow the robot to a scan; merge it, and those missed before it."""
+        found = self._tracker.place(seen, self._known)
+        self._merge_all(found)
+        return any(each is seen for each, _ in found)
+
+    def _merge_all(self, found: Found) -> None:
+        for seen, tracked in found:
+            self._merge(seen, tracked)
+
+    def _known(self) -> LineMap:
+        """G_(t-1): the lines around the robot, tracker's frame."""
+        growing = [] if self._growing.is_empty else [place(self._growing.lines(), self._frame)]
+        to_tracker = se2.inverse(self._origin)
+        last = [
+            place(s.map, se2.compose(to_tracker, s.pose))
+            for s in self._finished[-1:]
+            if s.component == self._component
+        ]
+        return unite_lines(last + growing)
+
+    def _start_again(self) -> None:
+        """Begin a new component with the scans that wait; they fit each other or wait on."""
+        waiting = self._tracker.missed
+        if not self._growing.is_empty:
+            self._finish_submap()
+        if any(s.component == self._component for s in self._finished):
+            self._component = self._newest_component = self._spare() + self._unsettled
+        self._follows = False
+        self._tracker = self._tracker.afresh()
+        self._origin = self._frame = se2.IDENTITY
+        for seen in waiting:
+            self._place(seen)
+
+    def _merge(self, seen: Observation, tracked: ScanMatch) -> None:
+        """Merge a scan where it was found, tracker's frame, into the growing submap."""
+        if self._growing.is_full:
+            self._finish_submap()
+        if self._growing.is_empty:
+            self._frame = tracked.pose
+        local = se2.between(self._frame, tracked.pose)
+        held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
+        held = turn_uncertainty(held, -self._frame[2])
+        self._growing.add(seen.scan, seen.lines.segments, local, held)
+        self._merged[seen.scan.index] = seen
+        self._version += 1
+
+    def _finish_submap(self) -> None:
+        """Have the growing submap settled, adopt what became of the one before, start another."""
+        self._adopt_settled()
+        submap = self._submap()
+        scans = tuple(self._merged[k] for k in submap.trajectory.scan_index.tolist())
+        self._backend.begin(FinishedSubmap(submap, scans, self._follows, self._spare()))
+        self._finished.append(submap)
+        self._unsettled = self._follows = True
+        self._growing = SubmapBuilder(self.parameters.backend.submap)
+        self._merged = {}
+        self._version += 1
+
+    def _adopt_settled(self) -> None:
+        """Move everything to where it settled, the growing submap with the last scan before it."""
+        settled = self._backend.take() if self._unsettled else None
+        self._unsettled = False
+        if settled is None:
+            return
+        before = _end(self._finished[-1])
+        self._finished = settled.applied(self._finished)
+        self._version += 1
+        self._newest_component = max(self._newest_component, settled.newest_component)
+        if self._follows:
+            after = _end(self._finished[-1])
+            self._component = self._finished[-1].component
+            moved = se2.compose(after, se2.inverse(before))
+            self._origin = se2.compose(moved, self._origin)
+
+    def _spare(self) -> int:
+        """Return the next component's number. One that joined another is not given again.
+
+        While a submap is being settled, this number is lent: it may be found to need one.
+        """
+        return self._newest_component + 1
+
+    def _submap(self) -> Submap:
+        return Submap(
+            len(self._finished),
+            self._component,
+            se2.compose(self._origin, self._frame),
+            self._growing.line_map(),
+            self._growing.trajectory(),
+        )
+
+
+def _end(submap: Submap) -> FloatArray:
+    """(3,) the pose of a submap's last scan, component frame."""
+    return se2.compose(submap.pose, submap.trajectory.pose[-1])

@@ -1,0 +1,146 @@
+"""Whether a scan is where it was found, or fits nowhere.
+
+What was seen speaks for a pose or against it; how far it is from where the robot should be speaks
+as well. A robot that was carried off sees look-alikes within reach: these are disputed, or take a
+leap to get to.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.mapping.tracking.local_map import ScanEvidence
+
+
+class AcceptanceParameters(BaseModel):
+    """What a pose must show; scores, shares and surprises are shares of the returns."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    novelty: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="what a return at a new place counts, against an explained one;"
+        " at 0 a pose that shows nothing new would always win",
+    )
+    convincing: float = Field(0.75, description="score above which a pose is taken as it is")
+    acceptable: float = Field(0.5, description="score above which it is, if all was searched")
+    plausible: float = Field(0.25, description="score above which it is, with more to be said")
+    max_doubt: float = Field(
+        0.25, gt=0, description="about a pose that does not convince: its disputed share, its leap"
+    )
+    leap: float = Field(2.5, ge=0, description="what surprise counts in that doubt")
+    margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
+    rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
+    rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+    held: float = Field(
+        2.5, gt=0, description="points that hold a pose in every direction, after a miss"
+    )
+    expected: float = Field(0.02, ge=0, description="surprise up to which a pose is expected")
+    expected_dispute: float = Field(0.15, ge=0, description="disputed share of one, at most")
+    undisputed: float = Field(0.05, ge=0, description="disputed share of one, after a miss")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanMatch:
+    """A pose found for a scan.
+
+    Attributes
+    ----------
+    pose
+        (3,) where [m, m, rad], tracking frame.
+    evidence
+        What speaks for and against it.
+    information
+        (3, 3) of `Fit`: which directions are held.
+    surprise, leap
+        How unlikely the step to it is, for this robot and for any; see `MotionModel`.
+    """
+
+    pose: FloatArray
+    evidence: ScanEvidence
+    information: FloatArray
+    surprise: float = 0.0
+    leap: float = 0.0
+
+    def value(self, novelty: float) -> float:
+        """Evidence less surprise: corridors leave a direction open, and speed is bounded."""
+        return self.evidence.score + novelty * self.evidence.novel - self.surprise
+
+
+def is_credible(tracked: ScanMatch, parameters: AcceptanceParameters) -> bool:
+    """Whether a pose convinces, or is hardly disputed and takes no leap to get to."""
+    p = parameters
+    doubt = tracked.evidence.disputed + p.leap * tracked.surprise
+    return tracked.evidence.score >= p.convincing or doubt <= p.max_doubt
+
+
+def tell_apart(
+    found: Sequence[ScanMatch], novelty: float, parameters: AcceptanceParameters
+) -> list[ScanMatch]:
+    """Return the poses that count after a miss, where the best can be told from look-alikes.
+
+    None where a different pose of those `found` is worth more than the best of them: along bare
+    walls many are as good, and the one that is held is so by chance.
+
+    Parameters
+    ----------
+    novelty
+        What a return at a new place counts.
+    """
+    again = [tracked for tracked in found if _is_found_again(tracked, parameters)]
+    best = max(again, key=lambda t: t.value(novelty), default=None)
+    if best is None:
+        return []
+    rivals = _rivals(best, found, parameters)
+    outdone = any(t.value(novelty) > best.value(novelty) for t in rivals)
+    return [] if outdone else again
+
+
+def _is_found_again(tracked: ScanMatch, parameters: AcceptanceParameters) -> bool:
+    """Whether a pose counts after a miss: held in every direction, and better than look-alikes.
+
+    The robot may be anywhere. So it must explain half of what is seen; or the robot should be there
+    and hardly anything speaks against it.
+    """
+    p, evidence = parameters, tracked.evidence
+    held = np.linalg.eigvalsh(tracked.information[:2, :2])[0]
+    undisputed = evidence.disputed <= p.undisputed and tracked.surprise <= p.expected
+    return bool(held >= p.held and (evidence.score >= p.acceptable or undisputed))
+
+
+def is_acceptable(
+    best: ScanMatch, found: Sequence[ScanMatch], parameters: AcceptanceParameters
+) -> bool:
+    """Whether the best of all that was `found`, and counts, is taken, though it explains little.
+
+    As at the edge of the known: where the robot should be and undisputed, or without a rival.
+    """
+    p, evidence = parameters, best.evidence
+    if evidence.score < p.plausible:
+        return False
+    if evidence.disputed <= p.expected_dispute and best.surprise <= p.expected:
+        return True
+    doubt = evidence.disputed + p.leap * best.leap
+    return doubt <= p.max_doubt and evidence.score - _best_rival(best, found, p) >= p.margin
+
+
+def _best_rival(best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters) -> float:
+    """The best score of those that differ from `best`; -1 where none does."""
+    return max((t.evidence.score for t in _rivals(best, found, p)), default=-1.0)
+
+
+def _rivals(
+    best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters
+) -> list[ScanMatch]:
+    """Those that differ from `best`."""
+    apart = se2.between(best.pose, np.stack([tracked.pose for tracked in found]))
+    different = (np.hypot(*apart[:, :2].T) > p.rival_distance) | (
+        np.abs(apart[:, 2]) > p.rival_turn
+    )
+    return [t for t, other in zip(found, different, strict=True) if other]

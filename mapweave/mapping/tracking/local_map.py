@@ -1,0 +1,206 @@
+"""What a robot saw lately: what the next scan is aligned to and judged by.
+
+Returns that lie on known surfaces speak for a pose; returns inside what earlier scans saw through,
+and known surfaces that the new scan sees through, speak against it.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.matching.correlative import CorrelativeParameters, LikelihoodField, search
+from mapweave.matching.icp import IcpParameters, Target, partners
+from mapweave.scan.points import OrientedPoints, join_points
+from mapweave.scan.scan import Scan
+from mapweave.scan.visibility import seen_through
+
+
+class LocalMapParameters(BaseModel):
+    """What is remembered, and when it speaks for or against a pose."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    icp: IcpParameters = IcpParameters()
+    search: CorrelativeParameters = CorrelativeParameters()
+    keyframes: int = Field(60, ge=1, description="how many are remembered: some 15-20 m of path")
+    keyframe_step: float = Field(0.3, gt=0, description="[m] of motion that makes a new one")
+    keyframe_turn: float = Field(0.26, gt=0, description="[rad] of rotation that makes one: 15°")
+    witnesses: int = Field(12, ge=1, description="nearest keyframes asked what they saw through")
+    overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
+    clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
+    sight: float = Field(12.0, gt=0, description="[m] up to which seeing through counts")
+    far_sight: float = Field(
+        25.0, gt=0, description="[m] the same for a surface that faces the sensor: a corridor's end"
+    )
+    facing: float = Field(
+        0.7,
+        gt=0,
+        lt=1,
+        description="cosine between a beam and the normal of a surface that faces it; far away,"
+        " a small turn moves a beam along such a surface, not before or behind it",
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanEvidence:
+    """What speaks for and against the pose of a scan, as shares in [0, 1].
+
+    Attributes
+    ----------
+    explained
+        Of the returns: on known surfaces.
+    contradicted
+        Of the returns: where earlier scans saw free space.
+    seen_through
+        Of the known surface points in sight: where this scan saw free space.
+    """
+
+    explained: float
+    contradicted: float
+    seen_through: float
+
+    @property
+    def novel(self) -> float:
+        """Of the returns: where nobody looked before; they speak neither for nor against."""
+        return 1.0 - self.explained - self.contradicted
+
+    @property
+    def score(self) -> float:
+        """For minus against."""
+        return self.explained - self.contradicted - self.seen_through
+
+    @property
+    def disputed(self) -> float:
+        """What speaks against, as a share of all that speaks."""
+        against = self.contradicted + self.seen_through
+        return against / max(self.explained + against, 1e-9)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keyframe:
+    """A remembered scan at its pose (3,), with its surface in the tracking frame."""
+
+    scan: Scan
+    pose: FloatArray
+    oriented: OrientedPoints
+
+
+class LocalMap:
+    """The last keyframes; empty until the first is remembered."""
+
+    def __init__(self, parameters: LocalMapParameters) -> None:
+        self._parameters = parameters
+        self._keyframes: deque[Keyframe] = deque(maxlen=parameters.keyframes)
+        self._target: Target | None = None
+        self._raster: LikelihoodField | None = None
+
+    def copy(self) -> "LocalMap":
+        """Return one that remembers by itself from now on."""
+        other = LocalMap(self._parameters)
+        other._keyframes = self._keyframes.copy()
+        other._target, other._raster = self._target, self._raster
+        return other
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was remembered yet."""
+        return not self._keyframes
+
+    @property
+    def target(self) -> Target:
+        """What scans are aligned to; there is none while the map is empty."""
+        if self._target is None:
+            oriented = join_points([k.oriented for k in self._keyframes])
+            self._target = Target.of(oriented, self._parameters.icp)
+        return self._target
+
+    def remember(self, scan: Scan, oriented: OrientedPoints, pose: FloatArray) -> None:
+        """Add a scan taken at `pose` (3,), unless it was taken about where the last one was.
+
+        Parameters
+        ----------
+        surface
+            Its oriented points, sensor frame.
+        """
+        if self._is_news(pose):
+            self._keyframes.append(Keyframe(scan, pose, oriented.moved(pose)))
+            self._target = self._raster = None
+
+    def search(self, points: FloatArray, centre: FloatArray, max_turn: float) -> FloatArray:
+        """Return the (k, 3) best poses for (n, 2) `points` in a window about `centre` (3,)."""
+        raster = self._nearness(centre)
+        return search(points, raster, centre, max_turn, self._parameters.search)
+
+    def _nearness(self, centre: FloatArray) -> LikelihoodField:
+        """Return a raster about `centre`, made anew only where it has moved away."""
+        p = self._parameters.search
+        if self._raster is None or np.abs(self._raster.centre - centre[:2]).max() > p.reach:
+            self._raster = LikelihoodField.of(self.target.oriented.points, centre[:2], p)
+        return self._raster
+
+    def evidence(
+        self, scan: Scan, oriented: OrientedPoints, poses: FloatArray
+    ) -> list[ScanEvidence]:
+        """Return what speaks for and against `scan` at each of `poses` (k, 3).
+
+        Parameters
+        ----------
+        surface
+            The oriented points of `scan`, sensor frame.
+        """
+        p = self._parameters
+        placed = join_points([oriented.moved(pose) for pose in poses])
+        distance, _ = partners(placed, self.target, p.icp, p.overlap)
+        explained = np.isfinite(distance).reshape(len(poses), -1)
+        judged = _faced(oriented, p) | (np.hypot(*oriented.points.T) < p.sight)
+        free = self._free_before(placed.points.reshape(*explained.shape, 2), poses)
+        contradicted = ~explained & free & judged
+        through = self._seen_through(scan, poses)
+        shares = zip(explained.mean(axis=1), contradicted.mean(axis=1), through, strict=True)
+        return [ScanEvidence(float(e), float(c), float(t)) for e, c, t in shares]
+
+    def _seen_through(self, scan: Scan, poses: FloatArray) -> FloatArray:
+        """(k,) share of the known points in sight that `scan` saw through from each pose."""
+        p = self._parameters
+        known = self.target.oriented.at(slice(None, None, 3))
+        shares = np.zeros(len(poses))
+        for k, pose in enumerate(poses):
+            local = known.moved(se2.inverse(pose))
+            near = np.hypot(*local.points.T) < p.sight
+            local = local.at(near | _faced(local, p))
+            if len(local):
+                through = seen_through(scan, local.points, p.clearance, p.far_sight)
+                shares[k] = through.mean()
+        return shares
+
+    def _free_before(self, points: FloatArray, poses: FloatArray) -> BoolArray:
+        """(k, n) which `points` (k, n, 2) were seen through by the keyframes about their pose."""
+        p = self._parameters
+        places = np.array([keyframe.pose[:2] for keyframe in self._keyframes])
+        distance = np.hypot(*(places[:, None] - poses[None, :, :2]).T)
+        asked = np.argsort(distance, axis=1, kind="stable")[:, : p.witnesses]
+        free = np.zeros(points.shape[:2], dtype=np.bool_)
+        for k in np.unique(asked):
+            keyframe, of = self._keyframes[int(k)], (asked == k).any(axis=1)
+            local = se2.transform_points(se2.inverse(keyframe.pose), points[of])
+            through = seen_through(keyframe.scan, local.reshape(-1, 2), p.clearance, p.far_sight)
+            free[of] |= through.reshape(local.shape[:2])
+        return free
+
+    def _is_news(self, pose: FloatArray) -> bool:
+        if not self._keyframes:
+            return True
+        x, y, turn = se2.between(self._keyframes[-1].pose, pose)
+        p = self._parameters
+        return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
+
+
+def _faced(oriented: OrientedPoints, p: LocalMapParameters) -> BoolArray:
+    """(n,) which points of `surface`, sensor frame, face the sensor and are not too far."""
+    distance = np.maximum(np.hypot(*oriented.points.T), 1e-9)
+    cosine = -np.einsum("ij,ij->i", oriented.points, oriented.normals) / distance
+    return np.asarray((cosine > p.facing) & (distance < p.far_sight))

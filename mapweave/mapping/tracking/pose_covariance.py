@@ -1,0 +1,77 @@
+"""How well determined a pose is, per direction: what ICP held it by, in metres and radians.
+
+Along a corridor's walls nothing holds a scan; across them they do. The error that is told is that
+of a scan against what was mapped lately, not what adds up over a path.
+"""
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+
+EXACT: FloatArray = np.zeros(4)
+"""Of a pose that was given and not found, as that of the scan that defines the frame."""
+EXACT.setflags(write=False)
+
+
+class PoseCovarianceParameters(BaseModel):
+    """What one point is worth, and what many of them are not."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    noise: float = Field(
+        0.1,
+        gt=0,
+        description="[m] of one point's residual, as in ICP: above the sensor's, because"
+        " neighbouring returns err alike",
+    )
+    floor: float = Field(
+        0.01, ge=0, description="[m] of what it was aligned to, however many points agree"
+    )
+    turn_floor: float = Field(0.002, ge=0, description="[rad] the same for the heading")
+    step: float = Field(
+        0.5, gt=0, description="[m] where nothing holds it: that of a step, as in tracking"
+    )
+    turn: float = Field(0.35, gt=0, description="[rad] the same for the turn, as in tracking")
+
+
+def pose_uncertainty(
+    information: FloatArray, parameters: PoseCovarianceParameters | None = None
+) -> FloatArray:
+    """Return (4,) standard deviations of a pose, and where the weakest points.
+
+    Parameters
+    ----------
+    information
+        (3, 3) of `Fit`: x, y and heading in units of one point, any frame. All zero where
+        nothing was aligned, as for the scan that defines the frame: then it is `EXACT`.
+
+    Returns
+    -------
+    uncertainty
+        Of the position in the direction that is held least [m], and across it [m]; of the
+        heading [rad]; and that direction in the frame of `information` [rad], in (-pi/2, pi/2].
+    """
+    if not information.any():
+        return EXACT
+    p = parameters or PoseCovarianceParameters()
+    unheld = np.diag([p.step, p.step, p.turn]) ** 2
+    covariance = np.linalg.inv(information / p.noise**2 + np.linalg.inv(unheld))
+    covariance += np.diag([p.floor, p.floor, p.turn_floor]) ** 2
+    spread, directions = np.linalg.eigh(covariance[:2, :2])
+    least = np.arctan2(directions[1, 1], directions[0, 1])
+    deviations = np.sqrt([spread[1], spread[0], covariance[2, 2]])
+    return np.array([*deviations, _undirected(float(least))])
+
+
+def turn_uncertainty(uncertainty: FloatArray, angle: float) -> FloatArray:
+    """Return (..., 4) `uncertainty` in a frame in which its own is turned by `angle` [rad]."""
+    turned = np.array(uncertainty, dtype=float)
+    turned[..., 3] = _undirected(turned[..., 3] + angle)
+    return turned
+
+
+def _undirected(angle: FloatArray | float) -> FloatArray:
+    """A line's direction in (-pi/2, pi/2]: it is the same both ways."""
+    return se2.wrap(2 * np.asarray(angle)) / 2

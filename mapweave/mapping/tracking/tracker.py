@@ -1,0 +1,299 @@
+"""Tracking: each scan against what was seen lately, from scans alone.
+
+Predict, align, and judge by all that both sides saw. Where the predicted pose does not convince,
+every motion in a window is searched; where that does not convince either, the scan is missed. The
+first one that fits again is on probation until the next one has confirmed it.
+
+Odometry, where a scan has it, is one more prediction beside the present pace: it may say where to
+look first, and what would surprise least, but what was seen decides.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.mapping.tracking.acceptance import (
+    AcceptanceParameters,
+    ScanMatch,
+    is_acceptable,
+    is_credible,
+    tell_apart,
+)
+from mapweave.mapping.tracking.local_map import LocalMap, LocalMapParameters, ScanEvidence
+from mapweave.mapping.tracking.motion_model import MotionModel, MotionModelParameters
+from mapweave.mapping.tracking.observation import Observation
+from mapweave.maps import LineMap
+from mapweave.matching.icp import Target, align, align_all
+from mapweave.scan.points import points_on_lines
+from mapweave.scan.scan import Scan
+from mapweave.shape.correspondence import CorrespondenceParameters, correspond
+
+Found = list[tuple[Observation, ScanMatch]]
+
+
+class TrackerParameters(BaseModel):
+    """What the tracker remembers, expects and accepts."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    local_map: LocalMapParameters = LocalMapParameters()
+    correspondence: CorrespondenceParameters = CorrespondenceParameters()
+    motion_model: MotionModelParameters = MotionModelParameters()
+    acceptance: AcceptanceParameters = AcceptanceParameters()
+    line_spacing: float = Field(0.1, gt=0, description="[m] between points on the map's lines")
+    max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
+    max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
+    prior_sigma: float = Field(0.5, gt=0, description="[m] of a prediction, in the alignment")
+    prior_turn: float = Field(0.35, gt=0, description="[rad] the same for the turn")
+    open_novelty: float = Field(
+        0.8, ge=0, le=1, description="what a return at a new place counts along bare walls"
+    )
+    open_direction: float = Field(
+        0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
+    )
+    open_reach: float = Field(1.2, gt=0, description="[m] searched along it, each way")
+    open_step: float = Field(0.2, gt=0, description="[m] between places tried")
+    first_window: float = Field(1.15, gt=0, description="[rad] half the rotation searched first")
+    min_points: int = Field(20, ge=3, description="a scan with fewer oriented points is blind")
+
+
+class _State(NamedTuple):
+    """All that following a scan changes."""
+
+    pose: FloatArray
+    missed: list[Observation]
+    motion_model: MotionModel
+    odometry: FloatArray | None
+    local: LocalMap
+
+
+class Tracker:
+    """Follows one sensor through consecutive scans; its frame is that of its first scan.
+
+    Attributes
+    ----------
+    pose
+        (3,) of the last scan that fitted [m, m, rad].
+    missed
+        The scans since then, which fitted nowhere, or were not confirmed by the next one.
+    """
+
+    def __init__(self, parameters: TrackerParameters | None = None) -> None:
+        self.parameters = parameters or TrackerParameters()
+        self.pose: FloatArray = se2.IDENTITY
+        self.missed: list[Observation] = []
+        self._motion = MotionModel(self.parameters.motion_model)
+        self._odometry: FloatArray | None = None
+        self._local = LocalMap(self.parameters.local_map)
+        self._before: _State | None = None  # of the scan on probation
+        self._probation: Found = []
+
+    def afresh(self) -> "Tracker":
+        """Return a tracker of the same robot that knows no place: it moves as it did."""
+        other = Tracker(self.parameters)
+        other._motion = self._motion.copy()
+        return other
+
+    def place(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
+        """Find the pose of a scan; of those that were missed as well, once it is found again.
+
+        Parameters
+        ----------
+        seen
+            The scan, prepared.
+        known
+            Makes the map so far, G_(t-1), tracking frame; asked only where motion alone does not
+            explain the scan.
+
+        Returns
+        -------
+        found
+            All scans that are placed by now and were not before; nothing where this one fits
+            nowhere, or is on probation.
+        """
+        if self.is_blind(seen):
+            return []
+        before = self._state() if self.missed else None
+        found = self._follow(seen, known)
+        if self._before is not None:
+            if found:
+                return [*self.settle(), *found]
+            self._take_back(seen)
+        elif found and before is not None:
+            self._before, self._probation = before, found
+            return []
+        return found
+
+    def settle(self) -> Found:
+        """Believe the scan on probation, and return it with those found with it."""
+        found, self._probation, self._before = self._probation, [], None
+        return found
+
+    def is_blind(self, seen: Observation) -> bool:
+        """Whether a scan shows too little to be placed anywhere."""
+        return len(seen.oriented) < self.parameters.min_points
+
+    def revisit(self, seen: Observation, near: FloatArray) -> ScanMatch | None:
+        """Find the pose of an older scan about `near` (3,), leaving the track as it is."""
+        p = self.parameters.acceptance
+        starts = self._local.search(seen.oriented.points, near, np.pi)
+        found = self._aligned(seen, np.vstack([near, starts]))
+        best = max(found, key=lambda t: t.evidence.score + p.novelty * t.evidence.novel)
+        return best if best.evidence.score >= p.acceptable else None
+
+    def _state(self) -> _State:
+        """Return how it is now, to come back to."""
+        copies = self._motion.copy(), self._odometry, self._local.copy()
+        return _State(self.pose, self.missed.copy(), *copies)
+
+    def _take_back(self, seen: Observation) -> None:
+        """Forget the scan on probation, which `seen` did not confirm: both are missed."""
+        if self._before is not None:
+            doubtful, _ = self._probation[0]
+            self.pose, missed, self._motion, self._odometry, self._local = self._before
+            self.missed = [*missed, doubtful, seen]
+        self._before, self._probation = None, []
+
+    def _follow(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
+        """Go on to `seen`, where it is; miss it, where that is nowhere."""
+        tracked = _first() if self._local.is_empty else self._locate(seen, known)
+        if tracked is None:
+            self.missed.append(seen)
+            return []
+        if not (self._local.is_empty or self.missed):
+            self._motion.add(se2.between(self.pose, tracked.pose), tracked.information)
+        self._odometry = seen.scan.odometry
+        self.pose = tracked.pose
+        self._local.remember(seen.scan, seen.walls, tracked.pose)
+        return [(seen, tracked), *self._found_again()]
+
+    def _found_again(self) -> Found:
+        """Try the scans that were missed once more, from the last one backwards."""
+        found, pose = [], self.pose
+        for seen in reversed(self.missed):
+            tracked = self.revisit(seen, pose)
+            if tracked is not None:
+                found.append((seen, tracked))
+                pose = tracked.pose
+        self.missed = []
+        return found
+
+    def _locate(self, seen: Observation, known: Callable[[], LineMap]) -> ScanMatch | None:
+        """Try what is likely first, then what shapes propose, then everything within reach."""
+        p, a = self.parameters, self.parameters.acceptance
+        predicted = self._predictions(seen.scan)
+        points = seen.oriented.points
+        stages: list[tuple[float, Callable[[], FloatArray]]] = [
+            (a.convincing, lambda: np.vstack([predicted, self.pose])),
+            (a.convincing, lambda: self._shape_starts(seen, known())),
+            (a.convincing, lambda: self._local.search(points, predicted[0], p.first_window)),
+            (a.acceptable, lambda: self._local.search(points, predicted[0], np.pi)),
+        ]
+        found: list[ScanMatch] = []
+        for enough, starts in stages:
+            found += self._reached(seen, starts())
+            best = self._best(found, a.novelty)
+            if best is not None and best.evidence.score >= enough and is_credible(best, a):
+                slides = self._slides(seen, best)
+                found += slides
+                best = self._best([best, *slides], p.open_novelty)
+                if best is not None:
+                    return best
+        likely = self._likely(found, a.novelty)
+        return best if best is not None and is_acceptable(best, likely, a) else None
+
+    def _likely(self, found: list[ScanMatch], novelty: float) -> list[ScanMatch]:
+        """Those that count: after a miss, where the best can be told from look-alikes."""
+        return tell_apart(found, novelty, self.parameters.acceptance) if self.missed else found
+
+    def _best(self, found: list[ScanMatch], novelty: float) -> ScanMatch | None:
+        """The one worth most of those that count; None where none does."""
+        return max(self._likely(found, novelty), key=lambda t: t.value(novelty), default=None)
+
+    def _predictions(self, scan: Scan) -> FloatArray:
+        """(k, 3) where the robot may be by now."""
+        return se2.compose(self.pose, self._motion.guesses(len(self.missed), self._told(scan)))
+
+    def _told(self, scan: Scan) -> FloatArray | None:
+        """(3,) the step since the last scan that was placed, by odometry; None without."""
+        if scan.odometry is None or self._odometry is None:
+            return None
+        return se2.between(self._odometry, scan.odometry)
+
+    def _reached(self, seen: Observation, starts: FloatArray) -> list[ScanMatch]:
+        """Align from each of `starts` (k, 3); leave out where a robot cannot have got to."""
+        p, missed = self.parameters, len(self.missed)
+        reach = p.max_step * (1 + missed / 2)  # missed scans took time
+        if missed:
+            reach = min(reach, self._motion.reach(1 + missed))
+        return [
+            t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= reach
+        ]
+
+    def _slides(self, seen: Observation, tracked: ScanMatch) -> list[ScanMatch]:
+        """Look along the direction that the walls leave open, if they leave one: a corridor.
+
+        Every place a bounded speed allows is tried, and where the pace would lead; what both sides
+        saw decides.
+        """
+        p = self.parameters
+        held, directions = np.linalg.eigh(tracked.information[:2, :2])
+        if held[0] > p.open_direction * held[1]:
+            return []
+        along, across = directions[:, 0], directions[:, 1]
+        way, _ = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))
+        usual = se2.rotation(self.pose[2]) @ way @ along
+        steps = np.append(np.arange(-p.open_reach, p.open_reach + 1e-9, p.open_step), usual)
+        starts = np.tile(self.pose, (len(steps), 1))
+        starts[:, 2] = tracked.pose[2]
+        starts[:, :2] += across * (across @ (tracked.pose - self.pose)[:2])
+        starts[:, :2] += steps[:, None] * along
+        return self._reached(seen, starts)
+
+    def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
+        """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
+        p = self.parameters
+        oriented, _ = points_on_lines(known, p.line_spacing)
+        starts = []
+        for found in correspond(known, seen.lines, p.correspondence):
+            partners_of = np.flatnonzero(found.corresponding.any(axis=1))
+            target = Target.of(
+                oriented.at(np.isin(oriented.polyline, partners_of)), p.local_map.icp
+            )
+            moving = seen.oriented.at(seen.oriented.polyline >= 0)
+            fit = align(moving, target, found.transform, p.local_map.icp, None, found.corresponding)
+            starts.append(fit.pose)
+        return np.array(starts).reshape(-1, 3)
+
+    def _aligned(self, seen: Observation, starts: FloatArray) -> list[ScanMatch]:
+        """Align from each of `starts` (k, 3), and judge where that ends."""
+        if len(starts) == 0:
+            return []
+        p = self.parameters
+        oriented = seen.oriented
+        stride = 1 + (len(oriented) - 1) // p.max_points
+        prior = np.diag([p.prior_sigma**-2, p.prior_sigma**-2, p.prior_turn**-2])
+        thinned = oriented.at(slice(None, None, stride))
+        fits = align_all(thinned, self._local.target, starts, p.local_map.icp, prior)
+        poses = np.array([fit.pose for fit in fits])
+        judged = self._local.evidence(seen.scan, oriented, poses)
+        since = len(self.missed), self._told(seen.scan)
+        return [
+            ScanMatch(
+                fit.pose,
+                evidence,
+                fit.information,
+                self._motion.surprise(step, *since),
+                self._motion.leap(step, *since),
+            )
+            for fit, evidence, step in zip(fits, judged, se2.between(self.pose, poses), strict=True)
+        ]
+
+
+def _first() -> ScanMatch:
+    """The first scan defines the frame."""
+    return ScanMatch(se2.IDENTITY, ScanEvidence(1.0, 0.0, 0.0), np.zeros((3, 3)))

@@ -1,0 +1,1 @@
+"""Hypothesise, align, verify (paper, VIII)."""

@@ -1,0 +1,131 @@
+"""Exhaustive search for a scan's pose in a window: coarse, and blind to no hypothesis.
+
+Shapes need shape: in clutter, or where only a stub of wall is shared, what decides is how many
+returns fall on what was seen before. A window of motions that a robot can make between two scans
+is small enough to score every one of them, on a raster of nearness.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from scipy.ndimage import distance_transform_edt
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import Float32Array, FloatArray, IntArray
+
+
+class CorrelativeParameters(BaseModel):
+    """The window of motions and its resolution."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    half_width: float = Field(14.0, gt=0, description="[m] of the raster about its centre")
+    cell: float = Field(0.1, gt=0, description="[m] of the raster")
+    nearness: float = Field(
+        0.15, gt=0, description="[m] standard deviation of the nearness kernel: half a step"
+    )
+    reach: float = Field(1.2, gt=0, description="[m] of translation, each way")
+    step: float = Field(0.2, gt=0, description="[m] between translations")
+    turn_step: float = Field(0.052, gt=0, description="[rad] between rotations: 3 degrees")
+    max_points: int = Field(120, ge=10, description="scan points that vote")
+    candidates: int = Field(6, ge=1, description="how many different maxima are handed on")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LikelihoodField:
+    """How near each place is to a known surface.
+
+    Attributes
+    ----------
+    origin
+        (2,) the raster's corner [m].
+    centre
+        (2,) its middle [m].
+    cell
+        [m].
+    value
+        (n + 1, n + 1) nearness in [0, 1]; the last row and column stand for everything outside: 0.
+    """
+
+    origin: FloatArray
+    centre: FloatArray
+    cell: float
+    value: Float32Array
+
+    @classmethod
+    def of(
+        cls, points: FloatArray, centre: FloatArray, p: CorrelativeParameters
+    ) -> "LikelihoodField":
+        """Rasterise (n, 2) `points` [m] in a square about `centre` (2,)."""
+        origin = centre - p.half_width
+        size = round(2 * p.half_width / p.cell)
+        index = np.floor((points - origin) / p.cell).astype(np.int64)
+        index = index[((index >= 0) & (index < size)).all(axis=1)]
+        empty = np.ones((size + 1, size + 1), dtype=np.bool_)
+        empty[index[:, 0], index[:, 1]] = False
+        distance = distance_transform_edt(empty) * p.cell
+        value = np.exp(-(distance**2) / (2 * p.nearness**2)).astype(np.float32)
+        value[size, :] = value[:, size] = 0
+        return cls(origin, centre.copy(), p.cell, value)
+
+
+def search(
+    points: FloatArray,
+    raster: LikelihoodField,
+    centre: FloatArray,
+    max_turn: float,
+    parameters: CorrelativeParameters,
+) -> FloatArray:
+    """Return the (k, 3) best poses for (n, 2) `points`, best first, all clearly different.
+
+    Parameters
+    ----------
+    centre
+        (3,) the middle of the window, raster frame.
+    max_turn
+        [rad] half the window's rotation; pi searches all.
+    """
+    p = parameters
+    if len(points) > p.max_points:
+        points = points[np.linspace(0, len(points) - 1, p.max_points).astype(np.int64)]
+    turns = centre[2] + np.arange(-max_turn, max_turn + 1e-9, p.turn_step)
+    shifts = np.arange(-p.reach, p.reach + 1e-9, p.step)
+    scores = np.stack(
+        [
+            _translation_scores(points @ se2.rotation(t).T, raster, centre[:2] + shifts[:, None])
+            for t in turns
+        ]
+    )
+    return np.array(
+        [
+            [centre[0] + shifts[i], centre[1] + shifts[j], se2.wrap(turns[k])]
+            for k, i, j in _separate_maxima(scores, p.candidates)
+        ]
+    )
+
+
+def _translation_scores(
+    rotated: FloatArray, raster: LikelihoodField, shifts: FloatArray
+) -> Float32Array:
+    """(s, s) mean nearness of `rotated` (n, 2) moved by each pair of `shifts` (s, 2) [m]."""
+    outside = raster.value.shape[0] - 1
+    base: IntArray = np.rint((shifts - raster.origin) / raster.cell).astype(np.int64)
+    cells: IntArray = np.floor(rotated / raster.cell).astype(np.int64)
+    column = base[:, 0, None] + cells[None, :, 0]
+    row = base[:, 1, None] + cells[None, :, 1]
+    column[(column < 0) | (column > outside)] = outside
+    row[(row < 0) | (row > outside)] = outside
+    scores: Float32Array = raster.value[column[:, None, :], row[None, :, :]].mean(axis=-1)
+    return scores
+
+
+def _separate_maxima(scores: Float32Array, count: int) -> list[tuple[int, int, int]]:
+    """Indices of the highest scores, each at least 4 turns or 3 shifts from the better ones."""
+    left = scores.copy()
+    found: list[tuple[int, int, int]] = []
+    for _ in range(count):
+        k, i, j = (int(v) for v in np.unravel_index(int(left.argmax()), left.shape))
+        found.append((k, i, j))
+        left[max(0, k - 3) : k + 4, max(0, i - 2) : i + 3, max(0, j - 2) : j + 3] = -1
+    return found

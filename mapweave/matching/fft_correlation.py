@@ -1,0 +1,201 @@
+"""Correlation: every shift of a map over another, for the turns at which their walls are parallel.
+
+The two direction histograms (paper, VI-A) leave a few turns open. For each of them the score of
+every shift at once is a correlation of rasters: a product in the frequency domain. Unlike shapes
+that must be found again, it misses no place where much wall is in common, however broken.
+
+Points and unit normals n are complex numbers, and so are the cells. Two walls that face directions
+apart by d count (1 + 2 cos d + cos 2d) / 4: all where they face the same way, nothing where they
+are square or back to back. With the contradictions both ways that makes three correlations, each
+the real part of Σ a conj(b):
+
+- n / 2 of places near a wall, with n · metres of wall;
+- n² / 4 of places near a wall, with n² · metres of wall;
+- what a metre of wall counts at a place, + i · metres of wall, of one map with the other way round
+  of the other.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from scipy.fft import fft2, ifft2, next_fast_len
+
+from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray
+from mapweave.matching.distance_field import DistanceField
+
+STEP = 2  # every second row and column of a map's raster is fine enough
+
+
+class FftCorrelationParameters(BaseModel):
+    """How fine and how many."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    cell: float = Field(0.3, gt=0, description="[m] of the rasters: what alignment mends")
+    max_size: int = Field(400, ge=16, description="[cells] along both maps; larger get coarser")
+    turns: int = Field(4, ge=1, description="the most likely ones; a rectangular building has four")
+    shifts: int = Field(50, ge=1, description="handed on for each turn, the best")
+    clearance: float = Field(
+        0.5,
+        gt=0,
+        description="[m] inside seen free space from which a wall contradicts; more than"
+        " when it is verified, for the shift and the turn are rough",
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marks:
+    """What a map puts into the cells, at complex places x + iy [m].
+
+    Attributes
+    ----------
+    wall, facing, metres
+        (n,) places of wall, their unit normals, and what they stand for [m].
+    near, alike
+        (m,) places near a wall, and its unit normal.
+    seen
+        (k,) places deep in the free space that was seen.
+    area
+        [m²] that each of `near` and `seen` stands for.
+    """
+
+    wall: ComplexArray
+    facing: ComplexArray
+    metres: FloatArray
+    near: ComplexArray
+    alike: ComplexArray
+    seen: ComplexArray
+    area: float
+
+    @classmethod
+    def of(cls, raster: DistanceField, closeness: float, clearance: float) -> "Marks":
+        """Take the marks of `raster`: near walls within `closeness` [m], and deep in free space."""
+        normals = _complex(raster.oriented.normals)
+        distance, depth = raster.distance[::STEP, ::STEP], raster.depth[::STEP, ::STEP]
+        near = distance < closeness
+        return cls(
+            _complex(raster.oriented.points),
+            normals,
+            raster.weight,
+            _centres(near, raster),
+            normals[raster.nearest[::STEP, ::STEP][near]],
+            _centres(~near & (depth > clearance), raster),
+            (STEP * raster.cell) ** 2,
+        )
+
+    def turned(self, turn: float) -> "Marks":
+        """Return the marks of the map turned by `turn` [rad] about its origin."""
+        by = np.exp(1j * turn)
+        turned = {n: getattr(self, n) * by for n in ("wall", "facing", "near", "alike", "seen")}
+        return replace(self, **turned)
+
+    @property
+    def low(self) -> FloatArray:
+        """(2,) least x and y [m]."""
+        places = np.concatenate([self.wall, self.near, self.seen])
+        return np.array([places.real.min(), places.imag.min()])
+
+    @property
+    def span(self) -> FloatArray:
+        """(2,) extent in x and y [m]."""
+        places = np.concatenate([self.wall, self.near, self.seen])
+        return np.array([np.ptp(places.real), np.ptp(places.imag)])
+
+
+def correlate(
+    reference: Marks,
+    other: Marks,
+    turns: FloatArray,
+    weight: float,
+    parameters: FftCorrelationParameters,
+) -> FloatArray:
+    """Return (m, 3) transforms from `other` to `reference`: the best shifts at (k,) `turns` [rad].
+
+    `weight` metres in common are outweighed by a metre contradicted.
+    """
+    if len(turns) == 0:
+        return np.empty((0, 3))
+    p = parameters
+    turned = [other.turned(float(turn)) for turn in turns]
+    span = reference.span + np.max([marks.span for marks in turned], axis=0)
+    cell = max(p.cell, float(span.max()) / p.max_size)
+    shape = (next_fast_len(int(span[0] / cell) + 2), next_fast_len(int(span[1] / cell) + 2))
+    here = _Grid(reference.low, cell, shape)
+    first, second = (fft2(here.near(reference, k) / (2 * k)) for k in (1, 2))
+    third = fft2(here.worth(reference, weight / 2) + 1j * here.metres(reference))
+    found = []
+    for turn, marks in zip(turns, turned, strict=True):
+        there = _Grid(marks.low, cell, shape)
+        spectrum = first * fft2(there.wall(marks, 1)).conj()
+        spectrum += second * fft2(there.wall(marks, 2)).conj()
+        opposite = there.metres(marks) + 1j * there.worth(marks, weight / 2)
+        spectrum += third * fft2(opposite).conj()
+        shift = _best_shifts(ifft2(spectrum).real, reference.span / cell, p.shifts)
+        place = here.low - there.low + cell * shift
+        found.append(np.column_stack([place, np.full(len(place), turn)]))
+    return np.concatenate(found)
+
+
+def _best_shifts(score: FloatArray, size: FloatArray, count: int) -> FloatArray:
+    """(count, 2) shifts [cells] of the highest score, fewer where there are not as many cells.
+
+    Those beyond `size` (2,) are negative.
+    """
+    count = min(count, score.size)
+    best = np.argpartition(score, -count, axis=None)[-count:]
+    shift = np.column_stack(np.unravel_index(best, score.shape)).astype(np.float64)
+    return np.where(shift > size + 1, shift - score.shape, shift)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Grid:
+    """Cells of `cell` [m] from the corner `low` (2,) [m]."""
+
+    low: FloatArray
+    cell: float
+    shape: tuple[int, int]
+
+    def wall(self, marks: Marks, power: int) -> ComplexArray:
+        """Metres of wall times their normals to the `power`."""
+        return self._sums(marks.wall, marks.facing**power * marks.metres)
+
+    def metres(self, marks: Marks) -> ComplexArray:
+        """Metres of wall."""
+        return self._sums(marks.wall, marks.metres.astype(np.complex128))
+
+    def near(self, marks: Marks, power: int) -> ComplexArray:
+        """The part of each cell that is near a wall, times its normal to the `power`."""
+        return self._sums(marks.near, marks.alike**power * self._part(marks))
+
+    def worth(self, marks: Marks, weight: float) -> ComplexArray:
+        """What a metre of wall counts in each cell, whichever way it faces.
+
+        An eighth where it is near wall, so that both ways give the quarter; the rest hangs on the
+        normals. Less `weight` where it was seen through.
+        """
+        near = self._sums(marks.near, np.full(len(marks.near), 0.125 * self._part(marks) + 0j))
+        seen = self._sums(marks.seen, np.full(len(marks.seen), weight * self._part(marks) + 0j))
+        return near - seen
+
+    def _part(self, marks: Marks) -> float:
+        return marks.area / self.cell**2
+
+    def _sums(self, places: ComplexArray, values: ComplexArray) -> ComplexArray:
+        """The sum of the `values` (n,) at complex `places` (n,) in each cell."""
+        i = ((places.real - self.low[0]) / self.cell).astype(np.int64)
+        j = ((places.imag - self.low[1]) / self.cell).astype(np.int64)
+        flat, size = i * self.shape[1] + j, self.shape[0] * self.shape[1]
+        real, imaginary = (np.bincount(flat, v, size) for v in (values.real, values.imag))
+        return (real + 1j * imaginary).reshape(self.shape).astype(np.complex64)
+
+
+def _complex(vectors: FloatArray) -> ComplexArray:
+    """(n,) x + iy of (n, 2) vectors."""
+    return vectors[:, 0] + 1j * vectors[:, 1]
+
+
+def _centres(chosen: BoolArray, raster: DistanceField) -> ComplexArray:
+    """Where the chosen ones of every STEP-th row and column of `raster` are."""
+    centres = raster.origin + raster.cell * (STEP * np.argwhere(chosen) + 0.5)
+    return _complex(centres)

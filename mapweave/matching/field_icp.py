@@ -1,0 +1,84 @@
+"""Alignment of many hypotheses at once, by look-up in a raster (paper, VIII, V1).
+
+The same steps as `icp.align_all`, coarser and without a tree: a sample's partner is the
+wall nearest to its cell, whichever way that faces, and pulls only where both face the same way.
+What survives is aligned once more, by `icp.align_all`.
+"""
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.matching.distance_field import DistanceField
+from mapweave.scan.points import OrientedPoints
+
+
+class FieldIcpParameters(BaseModel):
+    """How far samples pull and for how long."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    max_samples: int = Field(150, ge=10, description="of the moving map's walls")
+    start_scale: float = Field(
+        0.5, gt=0, description="[m] residual at which a pair's weight is a quarter, first iteration"
+    )
+    end_scale: float = Field(0.15, gt=0, description="[m] the same at the end: above a cell")
+    iterations: int = Field(8, ge=1, description="the scale shrinks evenly over them")
+    min_cosine: float = Field(0.7, ge=0, le=1, description="of the normals of a pair: 45°")
+    damping: float = Field(
+        0.01, gt=0, description="share of the samples that holds what the walls leave open"
+    )
+
+
+def align_on_raster(
+    reference: DistanceField,
+    other: DistanceField,
+    transforms: FloatArray,
+    parameters: FieldIcpParameters,
+) -> FloatArray:
+    """Return (k, 3) `transforms` moved until the walls of `other` lie on those of `reference`."""
+    p = parameters
+    stride = 1 + (len(other.weight) - 1) // p.max_samples
+    moving = other.oriented.at(slice(None, None, stride))
+    middle = moving.points.mean(axis=0)
+    # About the middle, so that turning and shifting do not hinder each other.
+    moving = OrientedPoints(moving.points - middle, moving.normals, moving.polyline)
+    poses = _about(transforms, middle)
+    for scale in np.geomspace(p.start_scale, p.end_scale, p.iterations):
+        poses = poses + _steps(reference, moving, poses, float(scale), p)
+    return _about(poses, -middle)
+
+
+def _about(transforms: FloatArray, middle: FloatArray) -> FloatArray:
+    """(k, 3) the same motions of coordinates less `middle` (2,)."""
+    moved = np.column_stack([np.tile(middle, (len(transforms), 1)), np.zeros(len(transforms))])
+    return se2.compose(transforms, moved)
+
+
+def _steps(
+    reference: DistanceField,
+    moving: OrientedPoints,
+    poses: FloatArray,
+    scale: float,
+    p: FieldIcpParameters,
+) -> FloatArray:
+    """(k, 3) Gauss-Newton steps of the robust point-to-line cost at (k, 3) `poses`."""
+    c, s = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+    (x, y), (u, v) = moving.points.T, moving.normals.T
+    arm = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    points = arm + poses[:, None, :2]
+    nearest, _, _ = reference.look_up(points)
+    apart = points - reference.oriented.points[nearest]
+    normals = reference.oriented.normals[nearest]
+    cosine = (c * u - s * v) * normals[..., 0] + (s * u + c * v) * normals[..., 1]
+    squared = (apart**2).sum(axis=-1)
+    weight = 1 / (1 + squared / scale**2) ** 2  # Geman-McClure
+    weight[(cosine < p.min_cosine) | (squared > 9 * scale**2)] = 0
+    residual = (normals * apart).sum(axis=-1)
+    lever = normals[..., 1] * arm[..., 0] - normals[..., 0] * arm[..., 1]
+    jacobian = np.concatenate([normals, lever[..., None]], axis=-1)
+    weighted = (jacobian * weight[..., None]).transpose(0, 2, 1)
+    damping = p.damping * len(moving) * np.eye(3)
+    gradient = weighted @ residual[..., None]
+    return np.asarray(-np.linalg.solve(weighted @ jacobian + damping, gradient)[..., 0])

@@ -1,0 +1,148 @@
+"""Hypotheses: rigid transforms that the shapes of two maps propose (paper, VIII, H1 and H2).
+
+Salient windows of polylines, corners of walls, and parallel walls each propose transforms. All
+proposals are scored at once by what both maps saw; the best that differ are aligned, all at once,
+and scored again; the best that clearly differ are handed on.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.lines.directions import likely_turns
+from mapweave.maps import LineMap
+from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.matching.fft_correlation import FftCorrelationParameters, Marks, correlate
+from mapweave.matching.field_icp import FieldIcpParameters, align_on_raster
+from mapweave.matching.verification import VerificationParameters, coarse_scores
+from mapweave.shape.corners import CornerParameters, Corners, find_corners, propose
+from mapweave.shape.windows import WindowParameters, Windows, all_windows, match_all
+
+
+class HypothesisParameters(BaseModel):
+    """What proposes, and how many proposals survive."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    windows: WindowParameters = WindowParameters(
+        lengths=(1.5, 4.0), samples=16, stride=0.15, max_windows=250, max_candidates=200
+    )
+    corners: CornerParameters = CornerParameters()
+    correlation: FftCorrelationParameters = FftCorrelationParameters()
+    turn_separation: float = Field(0.17, gt=0, description="[rad] between likely turns: 10°")
+    alignment: FieldIcpParameters = FieldIcpParameters()
+    proposal_samples: int = Field(60, ge=10, description="of a map's walls, scoring proposals")
+    aligned: int = Field(50, ge=2, description="proposals that are aligned, the best")
+    start_distance: float = Field(0.4, gt=0, description="[m] between those: what alignment mends")
+    start_turn: float = Field(0.09, gt=0, description="[rad] between those: 5°")
+    max_samples: int = Field(250, ge=10, description="of a map's walls, scoring what was aligned")
+    distance: float = Field(1.0, gt=0, description="[m] between different hypotheses (design)")
+    turn: float = Field(0.157, gt=0, description="[rad] between different hypotheses: 9° (design)")
+    count: int = Field(5, ge=2, description="handed on")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedMap:
+    """A line map with what comparing it takes; made once for each map."""
+
+    lines: LineMap
+    raster: DistanceField
+    windows: tuple[Windows, ...]
+    corners: Corners
+
+    @classmethod
+    def of(
+        cls, lines: LineMap, hypotheses: HypothesisParameters, raster: DistanceFieldParameters
+    ) -> "PreparedMap":
+        """Prepare `lines`, which have at least one segment."""
+        return cls(
+            lines,
+            DistanceField.of(lines, raster),
+            all_windows(lines.segments, lines.polyline, hypotheses.windows),
+            find_corners(lines.segments, hypotheses.corners),
+        )
+
+
+def hypothesise(
+    reference: PreparedMap,
+    other: PreparedMap,
+    parameters: HypothesisParameters,
+    verification: VerificationParameters,
+    proposals: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return (k, 3) transforms from `other` to `reference`, and their (k,) coarse scores [m].
+
+    Best first; any two differ by more than `parameters.distance` or `parameters.turn`, measured
+    at the middle of `other`.
+
+    Parameters
+    ----------
+    proposals
+        (n, 3) all that is possible, where that is known; without it, shapes propose.
+    """
+    p = parameters
+    if proposals is None:
+        proposals = _proposals(reference, other, p, verification)
+    middle = other.raster.oriented.points.mean(axis=0)
+    rough = coarse_scores(
+        reference.raster, other.raster, proposals, p.proposal_samples, verification
+    )
+    starts = _distinct(proposals, rough, middle, p.aligned, (p.start_distance, p.start_turn))
+    aligned = align_on_raster(reference.raster, other.raster, proposals[starts], p.alignment)
+    scores = coarse_scores(reference.raster, other.raster, aligned, p.max_samples, verification)
+    kept = different(aligned, scores, middle, p)
+    return aligned[kept], scores[kept]
+
+
+def _proposals(
+    reference: PreparedMap,
+    other: PreparedMap,
+    p: HypothesisParameters,
+    verification: VerificationParameters,
+) -> FloatArray:
+    """(n, 3) of windows alike, of corners alike, and of parallel walls."""
+    similar = match_all(reference.windows, other.windows, p.windows)
+    cornered = propose(reference.corners, other.corners, p.corners)
+    turns = likely_turns(
+        reference.lines.segments, other.lines.segments, p.correlation.turns, p.turn_separation
+    )
+    marks = [
+        Marks.of(shape.raster, verification.closeness, p.correlation.clearance)
+        for shape in (reference, other)
+    ]
+    weight = verification.contradiction_weight
+    shifted = correlate(marks[0], marks[1], turns, weight, p.correlation)
+    return np.vstack([similar.transform, cornered, shifted])
+
+
+def different(
+    transforms: FloatArray, scores: FloatArray, middle: FloatArray, p: HypothesisParameters
+) -> list[int]:
+    """Return indices of the best of (n, 3) `transforms`, each different from the better ones."""
+    return _distinct(transforms, scores, middle, p.count, (p.distance, p.turn))
+
+
+def _distinct(
+    transforms: FloatArray,
+    scores: FloatArray,
+    middle: FloatArray,
+    count: int,
+    least: tuple[float, float],
+) -> list[int]:
+    """Return indices of at most `count`, best first, `least` [m], [rad] apart at `middle` (2,)."""
+    c, s = np.cos(transforms[:, 2]), np.sin(transforms[:, 2])
+    place = transforms[:, :2] + np.column_stack(
+        [c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]]
+    )
+    left = np.argsort(-scores, kind="stable")
+    kept: list[int] = []
+    while len(left) and len(kept) < count:
+        best = int(left[0])
+        kept.append(best)
+        apart = np.hypot(*(place[left] - place[best]).T)
+        turned = np.abs(se2.wrap(transforms[left, 2] - transforms[best, 2]))
+        left = left[(apart > least[0]) | (turned > least[1])]
+    return kept

@@ -1,0 +1,232 @@
+"""Verification: what two maps say of a transform between them (paper, VIII, V2, and beyond).
+
+The paper confirms an alignment when parts of both maps are close in the Hausdorff sense and one
+of their polylines is complex enough. Look-alike places pass that test, so free space votes too:
+wall of one map where the other saw through is a contradiction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mapweave.maps import LineMap
+from mapweave.matching.distance_field import DistanceField
+from mapweave.shape.tangent_space import complexities
+
+DIRECTIONS = 64  # that coarse scores tell apart: 5.6° each
+AT_ONCE = 20_000  # transforms scored: their samples take some 10 MB an array
+NOTHING, SEEN_THROUGH = DIRECTIONS, DIRECTIONS + 1  # what a cell without a wall says
+
+
+class VerificationParameters(BaseModel):
+    """When walls coincide and when they contradict."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    closeness: float = Field(
+        0.25, gt=0, description="[m] Hausdorff distance below which walls coincide"
+    )
+    min_cosine: float = Field(
+        0.8, gt=0, le=1, description="of the angle between normals of coinciding walls: 37°"
+    )
+    clearance: float = Field(
+        0.3,
+        gt=0,
+        description="[m] inside seen free space from which a wall contradicts; covers"
+        " what two maps are bent against each other",
+    )
+    contradiction_weight: float = Field(
+        1.0, gt=0, description="metres in common that a metre contradicted outweighs"
+    )
+    shared_part: float = Field(
+        0.5, gt=0, le=1, description="share of a segment that coincides, to count as shared"
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What speaks for and against one transform.
+
+    Attributes
+    ----------
+    common
+        [m] of wall in both maps: the smaller of the two counts.
+    contradicted
+        [m] of wall, of both maps, that the other saw through.
+    overlap
+        Share of the wall of either map that lies where the other looked and that coincides.
+    residual
+        [m] median distance of coinciding walls.
+    held
+        [m] of common wall that hold the least held direction.
+    """
+
+    common: float
+    contradicted: float
+    overlap: float
+    residual: float
+    held: float
+    contradiction_weight: float
+
+    @property
+    def score(self) -> float:
+        """[m] of wall in common less wall contradicted."""
+        return self.common - self.contradiction_weight * self.contradicted
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OneWay:
+    """The samples of one map in the other: (n,) masks and weighted sums."""
+
+    coincides: BoolArray
+    distance: FloatArray
+    common: float
+    contradicted: float
+
+
+def coarse_scores(
+    reference: DistanceField,
+    other: DistanceField,
+    transforms: FloatArray,
+    max_samples: int,
+    parameters: VerificationParameters,
+) -> FloatArray:
+    """Return (k,) metres in common less contradicted for (k, 3) `transforms`, from few samples."""
+    scores = np.empty(len(transforms))
+    for start in range(0, len(transforms), AT_ONCE):
+        some = transforms[start : start + AT_ONCE]
+        forward = _coarse_one_way(reference, other, some, max_samples, parameters)
+        backward = _coarse_one_way(other, reference, se2.inverse(some), max_samples, parameters)
+        scores[start : start + AT_ONCE] = (forward + backward) / 2
+    return scores
+
+
+def _coarse_one_way(
+    reference: DistanceField,
+    other: DistanceField,
+    transforms: FloatArray,
+    max_samples: int,
+    p: VerificationParameters,
+) -> FloatArray:
+    """One look-up for each sample: in single precision, as the cells are coarser than that."""
+    stride = 1 + (len(other.weight) - 1) // max_samples
+    weight = other.weight[::stride] * (other.weight.sum() / other.weight[::stride].sum())
+    x, y = (other.oriented.points[::stride].T / reference.cell).astype(np.float32)
+    facing = _directions(other.oriented.normals[::stride]).astype(np.float32)
+    shift = ((transforms[:, :2] - reference.origin) / reference.cell).astype(np.float32)
+    turn = transforms[:, 2, None].astype(np.float32)
+    c, s = np.cos(turn), np.sin(turn)
+    rows, columns = reference.distance.shape
+    i = np.clip(c * x - s * y + shift[:, :1], 0, rows - 1).astype(np.int32)
+    j = np.clip(s * x + c * y + shift[:, 1:], 0, columns - 1).astype(np.int32)
+    said = _codes(reference, p).ravel()[i * columns + j]
+    direction = (facing + turn * np.float32(DIRECTIONS / (2 * np.pi))).astype(np.int32)
+    scores: FloatArray = _worth(p)[said + (direction & (DIRECTIONS - 1))] @ weight
+    return scores
+
+
+def _directions(normals: FloatArray) -> FloatArray:
+    """(n,) directions of unit vectors, in [0, DIRECTIONS), shifted so that sums stay positive."""
+    turns = np.arctan2(normals[:, 1], normals[:, 0]) / (2 * np.pi)
+    return np.asarray((turns % 1.0 + 4) * DIRECTIONS)
+
+
+def _codes(raster: DistanceField, p: VerificationParameters) -> IntArray:
+    """(rows, columns) what each cell says: a row of `_worth`, as an offset into it."""
+    row = np.where(raster.depth > p.clearance, SEEN_THROUGH, NOTHING)
+    near = raster.distance < p.closeness
+    facing = _directions(raster.oriented.normals).astype(np.int64) & (DIRECTIONS - 1)
+    row[near] = facing[raster.nearest[near]]
+    row[[0, -1], :] = row[:, [0, -1]] = NOTHING  # the rim stands for all that lies beyond it
+    return np.asarray(row * DIRECTIONS)
+
+
+def _worth(p: VerificationParameters) -> Float32Array:
+    """What a metre of wall counts, by the cell's code and the wall's direction, flat."""
+    turn = 2 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
+    worth: Float32Array = np.zeros((SEEN_THROUGH + 1, DIRECTIONS), dtype=np.float32)
+    worth[:DIRECTIONS] = np.cos(turn[:, None] - turn) > p.min_cosine
+    worth[SEEN_THROUGH] = -p.contradiction_weight
+    return worth.ravel()
+
+
+def verify(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    parameters: VerificationParameters,
+) -> Verdict:
+    """Return what both maps say of `transform` (3,) from `other` to `reference`."""
+    forward = _one_way(reference, other, transform, parameters)
+    backward = _one_way(other, reference, se2.inverse(transform), parameters)
+    contradicted = forward.contradicted + backward.contradicted
+    common = min(forward.common, backward.common)
+    return Verdict(
+        common,
+        contradicted,
+        common / max(common + contradicted, 1e-9),
+        float(np.median(forward.distance)) if len(forward.distance) else np.inf,
+        _held(other, forward.coincides),
+        parameters.contradiction_weight,
+    )
+
+
+def shared_complexity(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    lines: LineMap,
+    parameters: VerificationParameters,
+) -> float:
+    """Return the greatest sc(P) [rad²] among the polylines of the shared part (paper, V2).
+
+    Parameters
+    ----------
+    lines
+        The line map that `other` is the raster of.
+    """
+    coincides = coinciding(reference, other, transform, parameters)
+    counts = np.bincount(other.segment, minlength=len(lines.segments))
+    hits = np.bincount(other.segment[coincides], minlength=len(lines.segments))
+    shared = hits >= parameters.shared_part * np.maximum(counts, 1)
+    return float(complexities(lines.segments[shared], lines.polyline[shared]).max(initial=0.0))
+
+
+def coinciding(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    parameters: VerificationParameters,
+) -> BoolArray:
+    """Tell which samples (n,) of the walls of `other` are on walls of `reference`."""
+    return _one_way(reference, other, transform, parameters).coincides
+
+
+def _one_way(
+    reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
+) -> _OneWay:
+    """Look the samples of `other` up in `reference`."""
+    placed = other.oriented.moved(transform)
+    nearest, distance, depth = reference.look_up(placed.points)
+    cosine = np.einsum("ij,ij->i", placed.normals, reference.oriented.normals[nearest])
+    near = distance < p.closeness
+    coincides = near & (cosine > p.min_cosine)
+    _, _, own_depth = other.look_up(other.oriented.points)
+    # What its own map saw through later was no wall for long: it refutes nothing.
+    contradicts = ~near & (depth > p.clearance) & (own_depth < p.clearance)
+    return _OneWay(
+        coincides,
+        distance[coincides].astype(np.float64),
+        float(other.weight[coincides].sum()),
+        float(other.weight[contradicts].sum()),
+    )
+
+
+def _held(other: DistanceField, coincides: BoolArray) -> float:
+    """[m] of coinciding wall that hold the weakest direction of translation."""
+    normals = other.oriented.normals[coincides]
+    scatter = (normals * other.weight[coincides, None]).T @ normals
+    return float(np.linalg.eigvalsh(scatter)[0])

@@ -1,0 +1,114 @@
+"""Pictures of maps, as png or svg, that a person recognises the building in.
+
+The same map always gives the same bytes. Drawing needs matplotlib, the optional extra ``plot``.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+
+from mapweave.atomic import replace_file
+from mapweave.errors import FileError, MissingExtraError
+from mapweave.maps import JointMap, RobotMap
+from mapweave.pictures.scene import Scene, joint_scenes, robot_of, robot_scenes, tell_confidence
+
+PICTURE_SUFFIXES = (".svg", ".png")
+
+
+def draw_map(robot_map: RobotMap, path: str | Path, title: str | None = None) -> None:
+    """Draw a robot's map: walls by support, free space beneath, the path with its start.
+
+    Parameters
+    ----------
+    robot_map
+        The map; components whose relative pose is unknown are drawn side by side.
+    path
+        The file to write, ``.svg`` or ``.png``; whole or not at all.
+    title
+        Its headline; names the robot by default.
+
+    Raises
+    ------
+    FileError
+        If `path` has another suffix or cannot be written.
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    scenes = robot_scenes(robot_map)
+    scans = sum(len(submap.trajectory.scan_index) for submap in robot_map.submaps)
+    facts = [_count(scans, "scan"), *_facts(scenes)]
+    _draw(scenes, Path(path), title or f"Map of robot {robot_map.robot}", facts)
+
+
+def draw_joint(
+    joint: JointMap,
+    path: str | Path,
+    maps: Mapping[str, RobotMap] | None = None,
+    title: str | None = None,
+) -> None:
+    """Draw a joint map: a colour a robot, a panel a component.
+
+    Parameters
+    ----------
+    joint
+        The joint map.
+    path
+        The file to write, ``.svg`` or ``.png``; whole or not at all.
+    maps
+        Robot id to robot map: they add the paths and tint the free space each robot saw; without
+        them a robot is where its component starts.
+    title
+        Its headline; names the version by default.
+
+    Raises
+    ------
+    FileError
+        If `path` has another suffix or cannot be written.
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    scenes = joint_scenes(joint, maps)
+    robots = {robot_of(name) for scene in scenes for name in scene.robots}
+    facts = [_count(len(robots), "robot"), *_facts(scenes)]
+    if len(scenes) == 1:
+        facts += tell_confidence(scenes[0])
+    _draw(scenes, Path(path), title or f"Joint map, version {joint.version}", facts)
+
+
+def check_picture_suffix(path: Path) -> None:
+    """Raise FileError unless `path` ends in ``.svg`` or ``.png``: before long work, not after."""
+    if path.suffix.lower() not in PICTURE_SUFFIXES:
+        raise FileError(
+            path, f"expected a picture's name to end in {' or '.join(PICTURE_SUFFIXES)}"
+        )
+
+
+def _facts(scenes: Sequence[Scene]) -> list[str]:
+    walls = sum(len(scene.map.segments) for scene in scenes)
+    facts = [_count(walls, "wall segment")]
+    if len(scenes) > 1:
+        facts.append(f"{len(scenes)} components, their places to each other unknown")
+    return facts
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number:,} {thing}{'' if number == 1 else 's'}"
+
+
+def _draw(scenes: Sequence[Scene], path: Path, title: str, facts: Sequence[str]) -> None:
+    check_picture_suffix(path)
+    figure = _figure_module()
+    drawn = figure.draw(scenes, title, " · ".join(facts))
+    with replace_file(path) as temporary:
+        figure.save(drawn, temporary, path.suffix.lower()[1:])
+
+
+def _figure_module() -> ModuleType:
+    """Return `mapweave.pictures.figure`, which needs matplotlib."""
+    try:
+        from mapweave.pictures import figure
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "matplotlib":
+            raise
+        raise MissingExtraError("a picture", "plot") from error
+    return figure

@@ -1,0 +1,53 @@
+"""What a scan saw through: every beam proves the space before its return to be free."""
+
+import numpy as np
+
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.scan.scan import Scan
+
+
+def clear_ranges(scan: Scan, max_range: float) -> FloatArray:
+    """Return (beams,) how far [m] each beam and both its neighbours saw nothing.
+
+    The neighbours count because space between two beams is only known to be free as far as both
+    reach. A beam that did not come back proves nothing (glass, black cloth): 0.
+    """
+    reach = np.minimum(np.nan_to_num(scan.ranges, nan=0.0), max_range)
+    padded = np.concatenate([reach[:1], reach, reach[-1:]])
+    clear: FloatArray = np.minimum(np.minimum(padded[:-2], padded[1:-1]), padded[2:])
+    return clear
+
+
+def seen_through(
+    scan: Scan, points: FloatArray, margin: FloatArray | float, max_range: float
+) -> BoolArray:
+    """Tell which (n, 2) `points` [m], sensor frame, lie where `scan` saw free space.
+
+    Parameters
+    ----------
+    margin
+        [m] how much nearer than what the beam hit a point must be: scalar or (n,).
+    max_range
+        [m] beyond which a beam proves nothing.
+    """
+    clear = clear_ranges(scan, max_range)
+    beam, inside = _beams(scan, np.arctan2(points[:, 1], points[:, 0]))
+    before: BoolArray = np.hypot(points[:, 0], points[:, 1]) < clear[beam] - margin
+    through: BoolArray = inside & before
+    return through
+
+
+def _beams(scan: Scan, bearing: FloatArray) -> tuple[IntArray, BoolArray]:
+    """Return (n,) which beam points nearest to each `bearing` [rad], and whether one does.
+
+    Bearings are counted from the first beam on, so that it does not matter where a turn begins.
+    """
+    count = len(scan.angles)
+    spacing = (scan.angles[-1] - scan.angles[0]) / max(count - 1, 1)
+    turn = 2 * np.pi
+    steps = np.mod(bearing - scan.angles[0], turn) / spacing
+    closed = count * spacing > turn - spacing / 2  # the last beam and the first are neighbours
+    inside: BoolArray = (steps <= count - 1) | closed
+    beam: IntArray = np.rint(steps).astype(np.int64)
+    beam[beam >= count] = 0
+    return beam, inside

@@ -1,0 +1,1 @@
+"""Shape whatever its position (paper, VIII-A, B)."""

@@ -1,0 +1,1 @@
+"""Many robots: alignments to a joint map."""

@@ -1,0 +1,251 @@
+"""Which alignments to rely on, and the poses that follow.
+
+Accepted alignments are links between components. The most probable explanation of them all says
+which are right, given what the maps say of how they come to lie; the others are set aside and
+named. The poses are fitted to those that are right.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.team.min_cut import groups
+from mapweave.team.cycles import Edge, misfit, poses_along
+from mapweave.team.contradictions import ContradictionParameters, MapContradictions, PairVerdicts, PairVerdict
+from mapweave.team.consistency import ConsistencyParameters, bits, explain
+from mapweave.matching.distance_field import DistanceField
+from mapweave.maps import Alignment
+from mapweave.mapping.pose_graph import Constraint, optimise
+from mapweave.fusion.extrapolation import ExtrapolationParameters, bend
+from mapweave.team.inliers import component_confidence, part_right, rely, weakest_link
+
+SET_ASIDE = "set aside: "  # begins the reason of an accepted alignment that is not relied on
+REASON_LENGTH = 500  # characters, as many as a message carries
+
+
+class AlignmentGraphParameters(BaseModel):
+    """How alignments are weighed against each other, and the poses fitted to them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    explanations: ConsistencyParameters = ConsistencyParameters()
+    contradictions: ContradictionParameters = ContradictionParameters()
+    reach: ExtrapolationParameters = ExtrapolationParameters()
+    sigma: float = Field(0.1, gt=0, description="[m] of an alignment's translation")
+    turn_sigma: float = Field(0.01, gt=0, description="[rad] of an alignment's rotation")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cluster:
+    """Components whose relative poses are known.
+
+    Attributes
+    ----------
+    poses
+        Component name to its (3,) pose; the first has the identity.
+    confidence
+        Of the weakest part needed, strengthened by cycles; 1 for one component alone.
+    """
+
+    poses: Mapping[str, FloatArray]
+    confidence: float
+
+
+def shortened(reason: str) -> str:
+    """Return `reason`, cut off where it is too long."""
+    return reason if len(reason) <= REASON_LENGTH else f"{reason[: REASON_LENGTH - 1]}…"
+
+
+def cluster_components(
+    names: Sequence[str],
+    alignments: Sequence[Alignment],
+    parameters: AlignmentGraphParameters,
+    rasters: Mapping[str, DistanceField] | None = None,
+) -> tuple[list[Cluster], tuple[Alignment, ...]]:
+    """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
+
+    What contradictions leave of an alignment's confidence is given with it. Alignments that name
+    components not in `names` are left out.
+
+    Parameters
+    ----------
+    rasters
+        The maps of those components that have seen any wall, each in its frame: they object to
+        alignments that contradict them. What alignments differ by is measured at the maps'
+        middles, because that depends on no frame; without a map, at the component's origin.
+    """
+    known = set(names)
+    alignments = [a for a in alignments if a.reference in known and a.other in known]
+    graph = _Graph(names, alignments, parameters, rasters or {})
+    judged = tuple(graph.judge(alignment) for alignment in alignments)
+    return sorted(graph.clusters(), key=lambda c: -len(c.poses)), judged
+
+
+class _Graph:
+    """The accepted alignments between numbered components, in frames at their middles."""
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        alignments: Sequence[Alignment],
+        parameters: AlignmentGraphParameters,
+        rasters: Mapping[str, DistanceField],
+    ) -> None:
+        self._names, self._parameters = names, parameters
+        self._number = {name: number for number, name in enumerate(names)}
+        self._middles = np.array([_middle(rasters.get(name)) for name in names])
+        links = [a for a in alignments if a.decision == "accepted" and a.reference != a.other]
+        # In an order of their own, so that the order in which they came changes nothing.
+        links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
+        self._edge_of = {id(link): k for k, link in enumerate(links)}
+        self._edges = [self._edge(link) for link in links]
+        self._rigid = [_rigid(link) for link in links]
+        seen = {self._number[name]: raster for name, raster in rasters.items()}
+        witnesses = PairVerdicts(seen, self._middles, parameters.contradictions)
+        self._doubts = MapContradictions(len(names), self._edges, witnesses)
+        p = parameters.explanations
+        self._explanations = explain(len(names), self._edges, p, self._doubts)
+        self._right = rely(len(names), self._edges, self._explanations)
+
+    def _edge(self, link: Alignment) -> Edge:
+        first, second = self._number[link.reference], self._number[link.other]
+        there = se2.compose(link.transform, self._middles[second])
+        # What is asked first is whether the places are right; that maps are bent is no objection.
+        bent = bend(link.evidence.get("reach", 0.0), self._parameters.reach)
+        return Edge(first, second, se2.between(self._middles[first], there), _place(link), bent)
+
+    def clusters(self) -> list[Cluster]:
+        """Return the clusters, in the order of their first components."""
+        count, p = len(self._names), self._parameters.explanations
+        return [
+            Cluster(
+                self._poses(group),
+                component_confidence(group, count, self._edges, self._right, self._explanations, p)
+                * weakest_link(group, count, self._edges, self._right, self._rigid),
+            )
+            for group in groups(count, self._edges, self._right)
+        ]
+
+    def judge(self, alignment: Alignment) -> Alignment:
+        """Return `alignment`: less sure if others contradict it, and ambiguous if set aside."""
+        edge = self._edge_of.get(id(alignment))
+        if edge is None:
+            return alignment
+        sure = min(alignment.confidence, part_right(edge, self._explanations))
+        if edge not in self._right:
+            reason = shortened(f"{SET_ASIDE}{self._objection(edge)}; {alignment.reason}")
+            return replace(alignment, decision="ambiguous", confidence=sure, reason=reason)
+        return alignment if sure == alignment.confidence else replace(alignment, confidence=sure)
+
+    def _objection(self, k: int) -> str:
+        """What speaks against edge `k`, in words."""
+        edge = self._edges[k]
+        present = sorted(self._right)
+        poses, paths = poses_along(edge.first, len(self._names), self._edges, present)
+        if paths[edge.second] >= 0:
+            off = misfit(edge.transform, poses[edge.first], poses[edge.second])
+            others = sorted(self._tell(other) for other in bits(paths[edge.second]))
+            return (
+                f"{np.hypot(off[0], off[1]):.1f} m and {np.degrees(abs(off[2])):.0f}° off what"
+                f" {_enumerate(others)} {'say' if len(others) > 1 else 'says'}"
+            )
+        alone = self._witness_against(k, [*present, k])
+        if alone:
+            return self._tell_witness(alone)
+        together = self._witness_against(k, range(len(self._edges)))
+        if together:
+            return f"{self._tell_witness(together)}, by this alignment or another one between them"
+        return "contradicts others, and nothing tells for sure which is wrong"
+
+    def _witness_against(self, k: int, present: Sequence[int]) -> PairVerdict | None:
+        """Who speaks most against those joined by way of edge `k`, with the edges `present`."""
+        found = []
+        for witness in self._doubts.against(sorted(present)):
+            _, paths = poses_along(witness.first, len(self._names), self._edges, sorted(present))
+            if paths[witness.second] >> k & 1:
+                found.append(witness)
+        return max(found, key=lambda witness: witness.doubt, default=None)
+
+    def _tell_witness(self, witness: PairVerdict) -> str:
+        first, second = self._names[witness.first], self._names[witness.second]
+        verdict = witness.verdict
+        return (
+            f"{first} and {second} would have {verdict.contradicted:.0f} m of wall where the other"
+            f" saw free space, {verdict.common:.0f} m in common"
+        )
+
+    def _tell(self, k: int) -> str:
+        edge = self._edges[k]
+        return f"{self._names[edge.first]}-{self._names[edge.second]}"
+
+    def _poses(self, group: Sequence[int]) -> dict[str, FloatArray]:
+        """Poses of the components of `group`, the first in its own frame."""
+        if len(group) == 1:
+            return {self._names[group[0]]: np.zeros(3)}
+        inside = [k for k in sorted(self._right) if self._edges[k].first in group]
+        poses, _ = poses_along(group[0], len(self._names), self._edges, inside)
+        fitted = poses[list(group)]
+        if len(inside) >= len(group):  # a tree fits as it stands
+            fitted = self._fitted(group, inside, fitted)
+        frames = se2.compose(fitted, se2.inverse(self._middles[list(group)]))
+        frames = se2.between(frames[0], frames)
+        frames[0] = 0.0
+        return {self._names[node]: pose for node, pose in zip(group, frames, strict=True)}
+
+    def _fitted(self, group: Sequence[int], inside: Sequence[int], start: FloatArray) -> FloatArray:
+        """(n, 3) poses that fit all edges `inside`, from `start`."""
+        p = self._parameters
+        place = {node: k for k, node in enumerate(group)}
+        links = [
+            Constraint(place[e.first], place[e.second], e.transform, _covariance(e, p), trusted)
+            for e, trusted in self._with_bridges(inside)
+        ]
+        return optimise(start, links)[0]
+
+    def _with_bridges(self, inside: Sequence[int]) -> Iterator[tuple[Edge, bool]]:
+        """Yield the edges `inside`, and of each whether all hangs on it: nothing can refute it."""
+        count = len(self._names)
+        parts = len(groups(count, self._edges, inside))
+        _, paths = poses_along(self._edges[inside[0]].first, count, self._edges, inside)
+        for k in inside:
+            is_needed = any(path > 0 and path >> k & 1 for path in paths)
+            rest = [other for other in inside if other != k]
+            yield (
+                self._edges[k],
+                is_needed and len(groups(count, self._edges, rest)) > parts,
+            )
+
+
+def _place(link: Alignment) -> float:
+    """How probably the place is right; all that is known where nobody tells of the place."""
+    place = link.evidence.get("place", link.confidence)
+    return place if math.isfinite(place) else link.confidence
+
+
+def _rigid(link: Alignment) -> float:
+    """How probably the maps are right as wholes, if the place is."""
+    return min(link.confidence / max(_place(link), link.confidence, 1e-9), 1.0)
+
+
+def _covariance(edge: Edge, p: AlignmentGraphParameters) -> FloatArray:
+    """(3, 3) of an alignment between the middles of two maps."""
+    squared = p.sigma**2 + edge.bend**2
+    return np.diag([squared, squared, p.turn_sigma**2])
+
+
+def _middle(raster: DistanceField | None) -> FloatArray:
+    """(3,) frame at the middle of a map's wall; the map's own where it has seen none."""
+    x, y = raster.oriented.points.mean(axis=0) if raster else (0.0, 0.0)
+    return np.array([x, y, 0.0])
+
+
+def _enumerate(items: Sequence[str]) -> str:
+    """Return `items` in words; of many the first and how many more there are."""
+    if len(items) > 3:
+        return f"{', '.join(items[:2])} and {len(items) - 2} more"
+    return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)

@@ -1,0 +1,137 @@
+"""What maps say of each other where no alignment compares them: doubt in what joins them.
+
+Robots a and c, joined by way of b, may both have seen the same place. Walls of one where the other
+saw through speak against one of the alignments between them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.team.min_cut import groups
+from mapweave.team.cycles import Edge, poses_along
+from mapweave.matching.distance_field import DistanceField
+from mapweave.matching.verification import Verdict, VerificationParameters, verify
+
+
+class ContradictionParameters(BaseModel):
+    """How much contradiction is to be expected, and what more of it means.
+
+    Of some 90 pairs of stretches of the Intel, Seattle, CSAIL and Freiburg logs at their true
+    poses, none had more than 0.3 m beyond this allowance; moved by 2 to 8 m, half of them had more
+    than 2 m (CSAIL) to 57 m (Freiburg).
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    verification: VerificationParameters = VerificationParameters()
+    allowance: float = Field(
+        0.25,
+        ge=0,
+        lt=1,
+        description="share contradicted of the wall that both looked at, that bent maps may have",
+    )
+    metres_per_log: float = Field(
+        1.5, gt=0, description="[m] contradicted beyond that, that make it e times less probable"
+    )
+    step: float = Field(0.1, gt=0, description="[m] poses nearer to each other are judged once")
+    turn_step: float = Field(0.01, gt=0, description="[rad] as well")
+
+
+@dataclass(frozen=True, slots=True)
+class PairVerdict:
+    """Two components that contradict each other, and how.
+
+    Attributes
+    ----------
+    first, second
+        Their numbers.
+    verdict
+        What they say of how they are placed.
+    doubt
+        The log of the odds against that.
+    """
+
+    first: int
+    second: int
+    verdict: Verdict
+    doubt: float
+
+
+class PairVerdicts:
+    """The maps of numbered components; remembers what they said.
+
+    Parameters
+    ----------
+    rasters
+        Of each component that has seen any wall, in its frame.
+    frames
+        (n, 3) of the graph's nodes in the components' frames.
+    """
+
+    def __init__(
+        self, rasters: Mapping[int, DistanceField], frames: FloatArray, parameters: ContradictionParameters
+    ) -> None:
+        self._rasters, self._frames, self._p = rasters, frames, parameters
+        self._known: dict[tuple[int, ...], PairVerdict | None] = {}
+        self._reach = {k: _reach(raster, frames[k]) for k, raster in rasters.items()}
+
+    def ask(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
+        """Return what speaks against `transform` (3,) of node `second` in the frame of `first`."""
+        if first not in self._rasters or second not in self._rasters:
+            return None
+        if np.hypot(*transform[:2]) > self._reach[first] + self._reach[second]:
+            return None
+        steps = np.array([self._p.step, self._p.step, self._p.turn_step])
+        key = (first, second, *(int(v) for v in np.round(transform / steps)))
+        if key not in self._known:
+            self._known[key] = self._judge(first, second, transform)
+        return self._known[key]
+
+    def _judge(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
+        p = self._p
+        there = se2.compose(transform, se2.inverse(self._frames[second]))
+        pose = se2.compose(self._frames[first], there)
+        verdict = verify(self._rasters[first], self._rasters[second], pose, p.verification)
+        allowed = p.allowance * (max(verdict.common, 0.0) + verdict.contradicted)
+        excess = verdict.contradicted - allowed
+        return PairVerdict(first, second, verdict, excess / p.metres_per_log) if excess > 0 else None
+
+
+class MapContradictions:
+    """What the maps say against a choice of edges."""
+
+    def __init__(self, count: int, edges: Sequence[Edge], witnesses: PairVerdicts) -> None:
+        self._count, self._edges, self._witnesses = count, edges, witnesses
+
+    def __call__(self, removed: int) -> tuple[float, int]:
+        """Return the doubt in the edges that are left, and those between the worst witnesses."""
+        present = [k for k in range(len(self._edges)) if not removed >> k & 1]
+        against = self.against(present)
+        if not against:
+            return 0.0, 0
+        worst = max(against, key=lambda witness: witness.doubt)
+        _, paths = poses_along(worst.first, self._count, self._edges, present)
+        return sum(witness.doubt for witness in against), paths[worst.second]
+
+    def against(self, present: Sequence[int]) -> list[PairVerdict]:
+        """Return all that speaks against the edges `present`."""
+        found = []
+        for group in groups(self._count, self._edges, present):
+            if len(group) == 1:
+                continue
+            poses, _ = poses_along(group[0], self._count, self._edges, present)
+            for a, b in combinations(group, 2):
+                found.append(self._witnesses.ask(a, b, se2.between(poses[a], poses[b])))
+        return [witness for witness in found if witness is not None]
+
+
+def _reach(raster: DistanceField, frame: FloatArray) -> float:
+    """[m] from a node to the farthest wall of its map."""
+    apart = raster.oriented.points - frame[:2]
+    return float(np.hypot(apart[:, 0], apart[:, 1]).max())

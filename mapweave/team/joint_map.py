@@ -1,0 +1,131 @@
+"""The joint map: components aligned along accepted alignments, and merged (paper, VI to VIII)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from shapely.geometry.base import BaseGeometry
+
+from mapweave.team.alignment_graph import Cluster, AlignmentGraphParameters, cluster_components
+from mapweave.geometry.arrays import FloatArray
+from mapweave.assembly import lines_of, place, submaps_by_component, unite_lines
+from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, unite
+from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.maps import (
+    Alignment,
+    JointComponent,
+    JointMap,
+    LineMap,
+    RobotMap,
+)
+from mapweave.lines.merging import MergingParameters, evolve
+from mapweave.lines.polylines import group_polylines
+from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
+from mapweave.lines.simplification import SimplificationParameters, simplify, sources
+from mapweave.team.joint_optimization import JointOptimizer
+
+Weave: TypeAlias = Callable[[Cluster, Sequence[Alignment]], tuple[Cluster, Mapping[str, LineMap]]]
+
+
+class JointParameters(BaseModel):
+    """How robots' maps become one."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    graph: AlignmentGraphParameters = AlignmentGraphParameters()
+    merging: MergingParameters = MergingParameters(max_step=0.25, max_cost=0.2)
+    simplification: SimplificationParameters = SimplificationParameters()
+    free_space: FreeSpaceParameters = FreeSpaceParameters()
+    raster: DistanceFieldParameters = DistanceFieldParameters()
+    max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
+    segments: SegmentConfidenceParameters = SegmentConfidenceParameters()
+
+
+def build_joint_map(
+    components: Mapping[str, LineMap],
+    alignments: Sequence[Alignment],
+    version: int,
+    parameters: JointParameters | None = None,
+    weave: Weave | None = None,
+) -> JointMap:
+    """Return what the team knows: `components` (by name, such as ``a/0``) joined and merged.
+
+    Alignments that contradict others, or what robots saw, are set aside: they stay in the joint
+    map as ambiguous, the reason saying so.
+
+    Parameters
+    ----------
+    weave
+        Moves the submaps of a cluster to where they fit, given the alignments as they were judged;
+        without it components stay rigid.
+    """
+    p = parameters or JointParameters()
+    rasters = _rasters(components, p)
+    clusters, judged = cluster_components(sorted(components), alignments, p.graph, rasters)
+    joined = tuple(
+        _join(cluster, components, rasters, p)
+        if weave is None or len(cluster.poses) == 1
+        else _join_woven(*weave(cluster, judged), p)
+        for cluster in clusters
+    )
+    return JointMap(version, joined, judged)
+
+
+def build_team_map(
+    maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int, weaver: JointOptimizer
+) -> JointMap:
+    """Return what the team knows, its robots' submaps woven together."""
+    submaps = submaps_by_component(maps)
+    lines = {name: lines_of(each) for name, each in submaps.items()}
+    return build_joint_map(
+        lines,
+        alignments,
+        version,
+        weave=lambda cluster, judged: weaver.weave(cluster, submaps, judged),
+    )
+
+
+def _join_woven(
+    cluster: Cluster, components: Mapping[str, LineMap], p: JointParameters
+) -> JointComponent:
+    return _join(cluster, components, _rasters(components, p), p)
+
+
+def _rasters(components: Mapping[str, LineMap], p: JointParameters) -> dict[str, DistanceField]:
+    """Return the rasters of those components that have seen any wall."""
+    return {
+        name: DistanceField.of(lines, p.raster)
+        for name, lines in components.items()
+        if len(lines.segments)
+    }
+
+
+def _join(
+    cluster: Cluster,
+    components: Mapping[str, LineMap],
+    rasters: Mapping[str, DistanceField],
+    p: JointParameters,
+) -> JointComponent:
+    placed = [place(components[name], pose) for name, pose in cluster.poses.items()]
+    everything = unite_lines(placed)
+    free = unite([from_rings(everything.free_space)], p.free_space)
+    walls = _merged(everything, free, p)
+    wall, source = sources(walls, everything.segments)
+    support = np.bincount(wall, everything.support[source], minlength=len(walls))
+    order, polyline = group_polylines(walls, p.max_gap)
+    lines = LineMap(
+        walls[order], polyline, np.maximum(support, 1).astype(np.int64)[order], rings(free)
+    )
+    views = [(rasters[name], pose) for name, pose in cluster.poses.items() if name in rasters]
+    return JointComponent(
+        cluster.poses, cluster.confidence, lines, segment_confidence(lines, views, p.segments)
+    )
+
+
+def _merged(everything: LineMap, free: BaseGeometry, p: JointParameters) -> FloatArray:
+    """Return (n, 4) the walls of all submaps, merged (paper, VI) and simplified."""
+    seen, support = everything.segments, everything.support
+    lengths = np.hypot(*(seen[:, 2:] - seen[:, :2]).T)
+    merged = evolve(seen, lengths * support, p.merging).segments
+    return simplify(merged, seen, support, free, p.simplification)

@@ -1,0 +1,242 @@
+"""Weaving: the submaps of robots that were joined move to where all of them fit.
+
+An alignment lays one component on another as a whole, and both are bent by what tracking errs. So
+each submap is looked for in those about it, of whichever robot, as a robot closes its loops; a
+robust pose graph over all robots' submaps takes what is found. The robots' maps that are handed on
+bend by as much; which robots are joined, and how sure that is, was decided before.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.team.alignment_graph import Cluster
+from mapweave.geometry.arrays import FloatArray
+from mapweave.assembly import lines_of, place, unite_lines
+from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle
+from mapweave.maps import Alignment, LineMap, Submap, Trajectory
+from mapweave.mapping.pose_graph import Constraint, optimise
+from mapweave.mapping.submap_graph import joining_covariance, tracking_covariance
+
+
+class JointOptimizationParameters(BaseModel):
+    """Which submaps are compared, and what alignments are worth beside that."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    loops: LoopParameters = LoopParameters(min_drift=0.9, min_turn=0.1, remembered=512)
+    candidates: int = Field(2, ge=1, description="submaps of each component compared, the nearest")
+    most: int = Field(6, ge=1, description="submaps compared with one in all, the nearest")
+    reach: float = Field(8.0, gt=0, description="[m] between the middles of submaps compared")
+    step: float = Field(0.25, gt=0, description="[m] places nearer to each other are searched once")
+    turn_step: float = Field(0.03, gt=0, description="[rad] the same for turns")
+    alignment_sigma: float = Field(
+        0.3, gt=0, description="[m] of an alignment where it is held: that of whole maps, bent"
+    )
+    alignment_turn: float = Field(0.03, gt=0, description="[rad] the same for the turn")
+    newest: bool = Field(
+        default=False,
+        description="whether the newest submap of each component is compared as well: in a running"
+        " team it grows with every message, and goes along with the one before",
+    )
+    at_once: int = Field(
+        200, ge=1, description="new comparisons, some seconds; what is left is compared next time"
+    )
+    remembered: int = Field(20_000, ge=1, description="comparisons, the last")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Node:
+    """A submap of a component, at its pose (3,) in the cluster's frame, and its middle there."""
+
+    component: str
+    submap: Submap
+    middle: tuple[float, float]
+
+    @classmethod
+    def of(cls, component: str, frame: FloatArray, submap: Submap) -> "_Node":
+        placed = replace(submap, pose=se2.compose(frame, submap.pose))
+        x, y = middle(placed).tolist() if len(submap.trajectory.pose) else placed.pose[:2].tolist()
+        return cls(component, placed, (x, y))
+
+
+class _Compared(NamedTuple):
+    """Two submaps' lines, and about which step (x, y, turn) they are compared, in steps."""
+
+    older: LineMap
+    newer: LineMap
+    x: int
+    y: int
+    turn: int
+
+
+class JointOptimizer:
+    """Remembers what it compared: a finished submap never changes."""
+
+    def __init__(self, parameters: JointOptimizationParameters | None = None) -> None:
+        self._p = parameters or JointOptimizationParameters()
+        self._loops = LoopCloser(self._p.loops)
+        self._known: dict[_Compared, Constraint | None] = {}
+
+    def weave(
+        self,
+        cluster: Cluster,
+        submaps: Mapping[str, Sequence[Submap]],
+        alignments: Sequence[Alignment],
+    ) -> tuple[Cluster, dict[str, LineMap]]:
+        """Return `cluster` with the poses that fit best, and each component's lines, bent to fit.
+
+        Parameters
+        ----------
+        submaps
+            Of each component of the cluster, by its name.
+        alignments
+            As they were judged; the accepted ones of the cluster's components are relied on.
+        """
+        nodes = [
+            _Node.of(name, pose, s) for name, pose in cluster.poses.items() for s in submaps[name]
+        ]
+        closures = list(self._closures(nodes))
+        if not closures:
+            return cluster, {name: lines_of(submaps[name]) for name in cluster.poses}
+        links = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments), *closures]
+        fitted, _ = optimise(np.array([n.submap.pose for n in nodes]), links)
+        return _rooted(cluster, nodes, fitted)
+
+    def _tracked(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
+        """Yield how each submap of a component lies to the one before, tracked or joined."""
+        for k, (one, other) in enumerate(pairwise(nodes)):
+            if one.component == other.component:
+                step, p = se2.between(one.submap.pose, other.submap.pose), self._p.loops.graph
+                if _follows(one, other):
+                    covariance = tracking_covariance(one.submap.trajectory, step, p)
+                else:
+                    covariance = joining_covariance(p)
+                yield Constraint(k, k + 1, step, covariance, True)
+
+    def _aligned(
+        self, nodes: Sequence[_Node], cluster: Cluster, alignments: Sequence[Alignment]
+    ) -> Iterator[Constraint]:
+        """Yield how alignments lay those submaps to each other that are nearest.
+
+        Loosely: where submaps themselves were found in each other, that says more.
+        """
+        p = self._p
+        loose = np.array([p.alignment_sigma, p.alignment_sigma, p.alignment_turn])
+        covariance = np.diag(loose**2)
+        for a in alignments:
+            ours, theirs = (_of(nodes, name) for name in (a.reference, a.other))
+            if a.decision != "accepted" or not (ours and theirs):
+                continue
+            i, j = min(
+                ((i, j) for i in ours for j in theirs), key=lambda pair: _apart(nodes, *pair)
+            )
+            frames = cluster.poses[a.reference], cluster.poses[a.other]
+            first, second = (
+                se2.between(frame, nodes[k].submap.pose)
+                for frame, k in zip(frames, (i, j), strict=True)
+            )
+            step = se2.between(first, se2.compose(a.transform, second))
+            yield Constraint(i, j, step, covariance, True)
+
+    def _closures(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
+        """Yield how submaps lie to each other that saw the same walls."""
+        steps = np.array([self._p.step, self._p.step, self._p.turn_step])
+        left = self._p.at_once
+        for first, second in self._candidates(nodes):
+            older, newer = nodes[first].submap, nodes[second].submap
+            x, y, turn = np.round(se2.between(older.pose, newer.pose) / steps).astype(int).tolist()
+            asked = _Compared(older.map, newer.map, x, y, turn)
+            if asked not in self._known and left > 0:
+                left -= 1
+                self._remember(asked)
+            link = self._known.get(asked)
+            if link is not None:
+                yield replace(link, first=first, second=second)
+
+    def _remember(self, asked: _Compared) -> None:
+        """Compare, and forget the oldest comparison where there are too many."""
+        self._known[asked] = self._compared(asked)
+        if len(self._known) > self._p.remembered:
+            del self._known[next(iter(self._known))]
+
+    def _candidates(self, nodes: Sequence[_Node]) -> Iterator[tuple[int, int]]:
+        """Yield pairs of nodes near each other that tracking does not link."""
+        p = self._p
+        compared = [k for k in self._finished(nodes) if len(nodes[k].submap.map.segments)]
+        for k in compared:
+            near: dict[str, list[tuple[float, int]]] = {}
+            for j in (j for j in compared if j < k and not _is_tracked(nodes, j, k)):
+                near.setdefault(nodes[j].component, []).append((_apart(nodes, j, k), j))
+            nearest = sorted(
+                pair for those in near.values() for pair in sorted(those)[: p.candidates]
+            )
+            yield from ((j, k) for distance, j in nearest[: p.most] if distance < p.reach)
+
+    def _finished(self, nodes: Sequence[_Node]) -> list[int]:
+        """Return the nodes without the newest of each component, unless that is its only one."""
+        following = [n.component for n in nodes[1:]] + [None]
+        before = [None] + [n.component for n in nodes[:-1]]
+        return [
+            k
+            for k, node in enumerate(nodes)
+            if self._p.newest or node.component == following[k] or node.component != before[k]
+        ]
+
+    def _compared(self, asked: _Compared) -> Constraint | None:
+        """Look for the newer of two submaps in the older one."""
+        p, path = self._p, Trajectory.empty()
+        believed = np.array([asked.x * p.step, asked.y * p.step, asked.turn * p.turn_step])
+        older = Submap(0, 0, se2.IDENTITY, asked.older, path)
+        newer = Submap(1, 0, believed, asked.newer, path)
+        return self._loops.compare_two(older, newer, 0.0).link
+
+
+def _follows(one: _Node, other: _Node) -> bool:
+    """Whether the second was finished right after the first."""
+    return other.submap.id == one.submap.id + 1
+
+
+def _is_tracked(nodes: Sequence[_Node], first: int, second: int) -> bool:
+    """Whether tracking links two nodes."""
+    one, other = nodes[first], nodes[second]
+    return one.component == other.component and _follows(one, other)
+
+
+def _of(nodes: Sequence[_Node], component: str) -> list[int]:
+    return [k for k, node in enumerate(nodes) if node.component == component]
+
+
+def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
+    """[m] between the middles of two submaps."""
+    return math.dist(nodes[first].middle, nodes[second].middle)
+
+
+def _rooted(
+    cluster: Cluster, nodes: Sequence[_Node], fitted: FloatArray
+) -> tuple[Cluster, dict[str, LineMap]]:
+    """Return where components are as wholes, the first at the origin, and their lines.
+
+    Parameters
+    ----------
+    fitted
+        (n, 3) where the nodes fit [m, m, rad].
+    """
+    poses, lines = {}, {}
+    for name, frame in cluster.poses.items():
+        inside = _of(nodes, name)
+        before = np.array([se2.between(frame, nodes[k].submap.pose) for k in inside])
+        poses[name] = se2.fit(before, fitted[inside])
+        own = se2.between(poses[name], fitted[inside])
+        maps = [nodes[k].submap.map for k in inside]
+        lines[name] = unite_lines([place(m, pose) for m, pose in zip(maps, own, strict=True)])
+    first, root = next(iter(poses.items()))
+    rooted = {name: se2.between(root, pose) for name, pose in poses.items()}
+    rooted[first] = np.zeros(3)
+    return replace(cluster, poses=rooted), lines

@@ -1,0 +1,61 @@
+"""How sure each segment of a joint map is: by the scans that saw it, and the robots' vote."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.matching.distance_field import DistanceField
+from mapweave.maps import LineMap
+from mapweave.scan.points import OrientedPoints, points_on_lines
+
+
+class SegmentConfidenceParameters(BaseModel):
+    """When a map confirms a wall, and when it denies it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    spacing: float = Field(0.2, gt=0, description="[m] between samples of a wall")
+    closeness: float = Field(0.3, gt=0, description="[m] to a wall of its own, to confirm")
+    clearance: float = Field(0.3, gt=0, description="[m] inside its free space, to deny")
+
+
+def segment_confidence(
+    lines: LineMap,
+    views: Sequence[tuple[DistanceField, FloatArray]],
+    parameters: SegmentConfidenceParameters,
+) -> FloatArray:
+    """Return (n,) in [0, 1]: more with every scan and map that saw it, less with every denial.
+
+    n sightings give n / (n + 1), Laplace's rule for what was never denied. Of the maps that
+    looked there, c confirm and d deny: c / (c + d) of it is left, averaged along the segment.
+
+    Parameters
+    ----------
+    views
+        The maps that were joined, each with its (3,) pose in the frame of `lines`.
+    """
+    if len(lines.segments) == 0:
+        return np.empty(0)
+    oriented, owner = points_on_lines(lines, parameters.spacing)
+    confirm, deny = np.zeros(len(oriented)), np.zeros(len(oriented))
+    for raster, pose in views:
+        near, through = _vote(raster, pose, oriented, parameters)
+        confirm += near
+        deny += through
+    # What nobody confirms at this very place was merged from walls close by: one voice for it.
+    left = np.maximum(confirm, 1) / (np.maximum(confirm, 1) + deny)
+    agreed = np.bincount(owner, weights=left) / np.bincount(owner)
+    return np.asarray(lines.support / (lines.support + 1.0) * agreed)
+
+
+def _vote(
+    raster: DistanceField, pose: FloatArray, oriented: OrientedPoints, p: SegmentConfidenceParameters
+) -> tuple[BoolArray, BoolArray]:
+    """(n,) masks: where the map has a wall itself, and where it saw through instead."""
+    own = se2.transform_points(se2.inverse(pose), oriented.points)
+    _, distance, depth = raster.look_up(own)
+    near = distance <= p.closeness
+    return near, ~near & (depth > p.clearance)

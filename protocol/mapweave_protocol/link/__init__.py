@@ -1,0 +1,1 @@
+"""Sessions, and what comes and goes over them."""

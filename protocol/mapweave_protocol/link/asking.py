@@ -1,0 +1,56 @@
+"""Questions to the coordinator, answered from its store."""
+
+from typing import TypeVar
+
+import zenoh
+
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.keys import JOINT_QUERY
+from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
+from mapweave_protocol.wire.model import Message
+from mapweave_protocol.wire.queries import JointQuery
+
+ANSWER_WITHIN = 5.0  # [s]
+
+M = TypeVar("M", bound=Message)
+
+
+def ask_joint_maps(
+    session: zenoh.Session, team: str, query: JointQuery, timeout: float = ANSWER_WITHIN
+) -> list[JointMapMessage]:
+    """Return the joint maps that `query` asks for, versions ascending; none if nobody answers.
+
+    Raises
+    ------
+    MessageError
+        If an answer is not valid.
+    """
+    answers = _ask(session, team, query, JointMapMessage, timeout)
+    return sorted(answers, key=lambda message: message.version)
+
+
+def ask_robot_map(
+    session: zenoh.Session, team: str, robot: str, timeout: float = ANSWER_WITHIN
+) -> MapMessage | None:
+    """Return the last map of `robot` that the coordinator knows, complete; None if none.
+
+    Raises
+    ------
+    MessageError
+        If the answer is not valid, or is another robot's map.
+    """
+    answers = _ask(session, team, JointQuery(robot=robot), MapMessage, timeout)
+    if any(message.robot != robot for message in answers):
+        raise MessageError(MapMessage.format, f"answer about another robot than {robot!r}")
+    return max(answers, key=lambda message: message.version, default=None)
+
+
+def _ask(
+    session: zenoh.Session, team: str, query: JointQuery, kind: type[M], timeout: float
+) -> list[M]:
+    parameters = query.parameters
+    selector = JOINT_QUERY.build(team=team) + (f"?{parameters}" if parameters else "")
+    # The default keeps one reply a key; the answers to `since` all have the same.
+    replies = session.get(selector, consolidation=zenoh.ConsolidationMode.NONE, timeout=timeout)
+    return [decode(kind, reply.ok.payload.to_bytes()) for reply in replies if reply.ok]

@@ -1,0 +1,166 @@
+"""The team's maps in two lines: generators that yield what arrives, as typed values.
+
+Each opens a session of its own, and closes it when the generator is closed or ends.
+"""
+
+import logging
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TypeVar
+
+import zenoh
+
+from mapweave.maps import JointMap, RobotMap
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.asking import ask_joint_maps
+from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
+from mapweave_protocol.link.inbox import (
+    Arrival,
+    Inbox,
+    Reader,
+    alignment_reader,
+    joint_reader,
+    map_reader,
+    status_reader,
+)
+from mapweave_protocol.link.sequence import JointSequence
+from mapweave_protocol.link.session import declare_subscriber, open_session
+from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, MAP, STATUS
+from mapweave_protocol.wire.messages import AlignmentMessage, JointMapMessage, StatusMessage
+from mapweave_protocol.wire.model import Message
+from mapweave_protocol.wire.queries import JointQuery
+
+POLL = 0.5  # [s] after which a gap is asked about again
+
+M = TypeVar("M", bound=Message)
+_log = logging.getLogger(__name__)
+
+
+def joint_maps(
+    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+) -> Iterator[JointMap]:
+    """Yield the team's joint maps in the order of their versions, without a gap.
+
+    The first is the latest there is; who began to listen before there was any gets 1, 2, 3…
+
+    Parameters
+    ----------
+    team
+        The team's id.
+    connect
+        Endpoints of the router; by default ``MAPWEAVE_CONNECT`` or this machine.
+    timeout
+        End after this time without a new one [s]; None never ends.
+
+    Raises
+    ------
+    InvalidIdError
+        If `team` is not an id.
+    EndpointError
+        If an endpoint is not one.
+    UnreachableError
+        If no router answers within `timeout`.
+    """
+    with _listening(JOINT_MAP.pattern(team=team), connect, timeout, 1) as (session, inbox):
+
+        def ask(query: JointQuery) -> list[JointMapMessage]:
+            return _ask(session, team, query)
+
+        yield from _in_order(_read(joint_reader(), inbox, timeout), ask)
+
+
+def robot_maps(
+    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+) -> Iterator[RobotMap]:
+    """Yield the robots' maps as they grow; parameters and errors as for `joint_maps`."""
+    assembler = MapAssembler()
+    key = MAP.pattern(team=team)
+    with _listening(key, connect, timeout, MESSAGES_TO_COMPLETE) as (_, inbox):
+        for message in _read(map_reader(), inbox, timeout):
+            robot_map = assembler.update(message) if message else None
+            if robot_map is not None:
+                yield robot_map
+
+
+def alignments(
+    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+) -> Iterator[AlignmentMessage]:
+    """Yield what the robots find out about pairs of maps; as for `joint_maps`."""
+    with _listening(ALIGNMENT.pattern(team=team), connect, timeout, 1) as (_, inbox):
+        yield from filter(None, _read(alignment_reader(), inbox, timeout))
+
+
+def statuses(
+    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+) -> Iterator[StatusMessage]:
+    """Yield the robots' statuses; as for `joint_maps`."""
+    with _listening(STATUS.pattern(team=team), connect, timeout, 1) as (_, inbox):
+        yield from filter(None, _read(status_reader(), inbox, timeout))
+
+
+@contextmanager
+def _listening(
+    key: str, connect: Sequence[str] | None, timeout: float | None, history: int
+) -> Iterator[tuple[zenoh.Session, Inbox]]:
+    """Open a session and an inbox for what is published at `key`."""
+    inbox = Inbox()
+    with (
+        open_session(connect, patience=timeout) as session,
+        declare_subscriber(session, key, inbox.put, history=history),
+    ):
+        yield session, inbox
+
+
+def _read(reader: Reader[M], inbox: Inbox, timeout: float | None) -> Iterator[M | None]:
+    """Yield each valid message, and None now and then while there is none, until `timeout` [s]."""
+    heard = time.monotonic()
+    while timeout is None or time.monotonic() - heard < timeout:
+        arrival: Arrival | None = inbox.get(POLL if timeout is None else min(POLL, timeout))
+        message = reader.read(arrival) if arrival else None
+        if message is not None:
+            heard = time.monotonic()
+        yield message
+
+
+def _in_order(
+    messages: Iterator[JointMapMessage | None],
+    ask: Callable[[JointQuery], list[JointMapMessage]],
+) -> Iterator[JointMap]:
+    """Yield the joint maps of `messages` in order; ask for the latest, and for what is missing."""
+    latest = ask(JointQuery())
+    sequence = JointSequence(from_the_first=not latest)
+    for message in latest:
+        sequence.offer(message)
+    yield from iter(sequence.take, None)
+    for new in messages:
+        if new is not None:
+            sequence.offer(new)
+        yield from iter(sequence.take, None)
+        if sequence.gap is not None:
+            yield from _close_gap(sequence, sequence.gap, ask)
+
+
+def _close_gap(
+    sequence: JointSequence,
+    gap: JointQuery,
+    ask: Callable[[JointQuery], list[JointMapMessage]],
+) -> Iterator[JointMap]:
+    for message in ask(gap):
+        sequence.offer(message)
+    filled = sequence.take()
+    if filled is None:
+        skipped = sequence.give_up()
+        if skipped:
+            _log.warning("%d versions of the joint map are lost", skipped)
+    else:
+        yield filled
+    yield from iter(sequence.take, None)
+
+
+def _ask(session: zenoh.Session, team: str, query: JointQuery) -> list[JointMapMessage]:
+    try:
+        return ask_joint_maps(session, team, query)
+    except MessageError as error:
+        _log.warning("answer ignored, %s", error)
+        return []

@@ -1,0 +1,177 @@
+"""``mapweave watch``: what a team does, told as it happens."""
+
+import argparse
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from typing import TypeVar
+
+import zenoh
+from rich.console import Console, Group
+from rich.live import Live
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from mapweave.cli import Command
+from mapweave_protocol.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.asking import ask_joint_maps
+from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
+from mapweave_protocol.link.inbox import (
+    Arrival,
+    Inbox,
+    Reader,
+    alignment_reader,
+    joint_reader,
+    map_reader,
+    read_presence,
+    status_reader,
+)
+from mapweave_protocol.link.session import declare_subscriber, open_session
+from mapweave_protocol.narration.story import Story
+from mapweave_protocol.narration.story_joint import tell_components
+from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, LIVE, MAP, STATUS
+from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
+from mapweave_protocol.wire.model import Message
+from mapweave_protocol.wire.queries import JointQuery
+
+KEPT_LINES = 20  # of the story stay on the terminal
+POLL = 0.5  # [s]
+HISTORY = {MAP: MESSAGES_TO_COMPLETE, STATUS: 1, ALIGNMENT: 1, JOINT_MAP: 1}
+
+M = TypeVar("M", bound=Message)
+Teller = Callable[[Arrival], Iterator[str]]
+_log = logging.getLogger(__name__)
+
+
+class Watcher:
+    """Reads what arrives and tells it."""
+
+    def __init__(self) -> None:
+        self.story = Story()
+        self._assembler = MapAssembler()
+        self._told: tuple[str, int] | None = None
+        self._tellers: tuple[Teller, ...] = (
+            self._tell_presence,
+            _teller(status_reader(), self.story.status),
+            _teller(map_reader(), self._tell_map),
+            _teller(alignment_reader(), self.story.aligned),
+            _teller(joint_reader(), self.tell_joint),
+        )
+
+    def tell(self, arrival: Arrival) -> Iterator[str]:
+        """Yield the lines that tell `arrival`."""
+        for teller in self._tellers:
+            yield from teller(arrival)
+
+    def tell_joint(self, message: JointMapMessage) -> Iterator[str]:
+        """Yield the lines that tell a version of the joint map, once."""
+        if self._told != (message.series, message.version):
+            self._told = message.series, message.version
+            yield from self.story.joined(message.unpack())
+
+    def _tell_map(self, message: MapMessage) -> Iterator[str]:
+        robot_map = self._assembler.update(message)
+        if robot_map is not None:
+            yield from self.story.mapped(robot_map)
+
+    def _tell_presence(self, arrival: Arrival) -> Iterator[str]:
+        presence = read_presence(arrival)
+        if presence is not None:
+            change = self.story.appeared if presence.here else self.story.left
+            yield from change(presence.robot, presence.boot)
+
+
+def _teller(reader: Reader[M], tell: Callable[[M], Iterator[str]]) -> Teller:
+    def teller(arrival: Arrival) -> Iterator[str]:
+        message = reader.read(arrival) if reader.reads(arrival) else None
+        return tell(message) if message is not None else iter(())
+
+    return teller
+
+
+def watch(
+    team: str, endpoints: Sequence[str], watcher: Watcher, on_wait: Callable[[], None]
+) -> Iterator[str | None]:
+    """Yield the lines of the story as it happens, and None now and then while nothing does."""
+    inbox = Inbox()
+    with open_session(endpoints, on_wait=on_wait) as session, ExitStack() as subscribers:
+        _subscribe(session, team, inbox, subscribers)
+        for latest in _ask_latest(session, team):
+            yield from watcher.tell_joint(latest)
+        while True:
+            arrival = inbox.get(POLL)
+            yield from watcher.tell(arrival) if arrival else (None,)
+
+
+def _ask_latest(session: zenoh.Session, team: str) -> list[JointMapMessage]:
+    try:
+        return ask_joint_maps(session, team, JointQuery())
+    except MessageError as error:
+        _log.warning("answer ignored, %s", error)
+        return []
+
+
+def _subscribe(session: zenoh.Session, team: str, inbox: Inbox, stack: ExitStack) -> None:
+    for keys, history in HISTORY.items():
+        key = keys.pattern(team=team)
+        stack.enter_context(declare_subscriber(session, key, inbox.put, history=history))
+    live = LIVE.pattern(team=team)
+    stack.enter_context(session.liveliness().declare_subscriber(live, inbox.put, history=True))
+
+
+def _show(story: Story, lines: Sequence[str]) -> Group:
+    """Return the robots as a table, who is together, and the last lines of the story."""
+    table = Table("robot", "", "progress", "submaps", "segments", box=None)
+    for robot, state in sorted(story.robots.items()):
+        here = "[green]here[/]" if state.boot else "[red]gone[/]"
+        table.add_row(robot, here, state.progress, str(state.submaps), str(state.segments))
+    joint = story.joint
+    together = f"joint map {joint.version}: {tell_components(joint)}" if joint else ""
+    return Group(table, Text(together), "", *(Text(line) for line in lines))
+
+
+def _run_live(console: Console, watcher: Watcher, story: Iterator[str | None]) -> None:
+    lines: deque[str] = deque(maxlen=KEPT_LINES)
+    with Live(console=console, auto_refresh=False) as live:
+        for line in story:
+            if line is not None:
+                lines.append(_stamped(line))
+            live.update(_show(watcher.story, lines), refresh=True)
+
+
+def _run_plain(console: Console, story: Iterator[str | None]) -> None:
+    for line in filter(None, story):
+        console.print(Text(_stamped(line)), soft_wrap=True)
+
+
+def _stamped(line: str) -> str:
+    return f"{time.strftime('%H:%M:%S')} {line}"
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    add_connection_arguments(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    team, endpoints = connection_of(options)
+    console = Console()
+    waiting = Console(stderr=True)
+    watcher = Watcher()
+    story = watch(
+        team,
+        endpoints,
+        watcher,
+        lambda: waiting.print(f"waiting for a router at {escape(', '.join(endpoints))}"),
+    )
+    if console.is_terminal:
+        _run_live(console, watcher, story)
+    else:
+        _run_plain(console, story)
+    return 0
+
+
+command = Command("Show what a team does, as it happens.", _configure, _run)

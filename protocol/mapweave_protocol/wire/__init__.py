@@ -1,0 +1,1 @@
+"""What travels: keys, messages and their bytes."""

@@ -1,0 +1,85 @@
+"""Every key, built and parsed in one place from one format string each.
+
+``@v1`` names the version of this layout: keys of different versions never match each other.
+"""
+
+import re
+import secrets
+from dataclasses import dataclass
+from functools import cached_property
+from string import Formatter
+
+from mapweave.ids import check_id
+from mapweave_protocol.errors import ForeignKeyError
+
+ANY = "*"
+
+
+@dataclass(frozen=True)
+class KeyFormat:
+    """A key with named parts, each a valid id.
+
+    Attributes
+    ----------
+    text
+        The format string; a part is written ``{name}``.
+    """
+
+    text: str
+
+    def build(self, **parts: str) -> str:
+        """Return the key with these parts.
+
+        Raises
+        ------
+        InvalidIdError
+            If a part is not an id.
+        """
+        return self.text.format(**{name: check_id(name, part) for name, part in parts.items()})
+
+    def pattern(self, **parts: str) -> str:
+        """Return the key expression with these parts, any id matching those not given."""
+        checked = {name: check_id(name, part) for name, part in parts.items()}
+        return self.text.format(**dict.fromkeys(self.names, ANY) | checked)
+
+    def parse(self, key: str) -> dict[str, str]:
+        """Return the parts of `key` by name.
+
+        Raises
+        ------
+        ForeignKeyError
+            If `key` is not of this format.
+        InvalidIdError
+            If a part of it is not an id.
+        """
+        match = self._regex.fullmatch(key)
+        if match is None:
+            raise ForeignKeyError(key, self.text)
+        return {name: check_id(name, part) for name, part in match.groupdict().items()}
+
+    def matches(self, key: str) -> bool:
+        """Tell whether `key` is of this format, its parts unchecked."""
+        return self._regex.fullmatch(key) is not None
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the parts, in their order."""
+        return tuple(name for _, name, _, _ in Formatter().parse(self.text) if name)
+
+    @cached_property
+    def _regex(self) -> re.Pattern[str]:
+        groups = {name: f"(?P<{name}>[^/]+)" for name in self.names}
+        return re.compile(self.text.format(**groups))
+
+
+MAP = KeyFormat("mapweave/@v1/{team}/agent/{robot}/map")
+STATUS = KeyFormat("mapweave/@v1/{team}/agent/{robot}/status")
+ALIGNMENT = KeyFormat("mapweave/@v1/{team}/agent/{robot}/alignment/{reference}/{other}")
+JOINT_MAP = KeyFormat("mapweave/@v1/{team}/joint/map")
+JOINT_QUERY = KeyFormat("mapweave/@v1/{team}/joint/query")
+LIVE = KeyFormat("mapweave/@v1/{team}/@live/{robot}/{boot}")
+
+
+def new_boot() -> str:
+    """Return a fresh name for this run of a robot."""
+    return secrets.token_hex(6)

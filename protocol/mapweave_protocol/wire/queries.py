@@ -1,0 +1,69 @@
+"""The coordinator's queryable: what may be asked, as the parameters of a selector.
+
+Replies, one sample each, on the same key: to none and ``version=N`` a `JointMapMessage`, to
+``since=N`` one for every version after N in their order, to ``robot=ID`` a complete `MapMessage`.
+"""
+
+import re
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.wire.model import Count, Id
+
+_NUMBER = re.compile(r"[0-9]{1,15}")
+
+
+class JointQuery(BaseModel):
+    """A question to the coordinator: one of the three, or none for the latest joint map.
+
+    Attributes
+    ----------
+    version
+        The joint map of this number.
+    since
+        All joint maps of a higher number.
+    robot
+        The last map of this robot, gone or not.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    version: Count | None = Field(default=None)
+    since: Count | None = Field(default=None)
+    robot: Id | None = Field(default=None)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if len(self._given()) > 1:
+            raise ValueError("expected one of version, since and robot")
+        return self
+
+    @property
+    def parameters(self) -> str:
+        """The part of the selector after the question mark."""
+        return ";".join(f"{name}={value}" for name, value in self._given().items())
+
+    @classmethod
+    def parse(cls, parameters: str) -> Self:
+        """Return the query that `parameters` says.
+
+        Raises
+        ------
+        MessageError
+            If it is none.
+        """
+        pairs = [part.partition("=") for part in parameters.split(";") if part]
+        values: dict[str, int | str] = {
+            name: int(value) if name != "robot" and _NUMBER.fullmatch(value) else value
+            for name, _, value in pairs
+        }
+        try:
+            return cls.model_validate(values)
+        except ValueError as error:
+            expected = "expected one of version=N, since=N, robot=ID, or nothing"
+            raise MessageError("query", f"{parameters[:80]!r}: {expected}") from error
+
+    def _given(self) -> dict[str, int | str]:
+        return self.model_dump(exclude_none=True)

@@ -1,0 +1,55 @@
+"""How far a robot is, as a message."""
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from mapweave_protocol.wire.model import Count, Id, Label, Message, Number, WireModel
+
+MAX_PEERS = 1024
+
+
+class Compared(WireModel):
+    """From which states of the maps a pair's alignment was last published."""
+
+    own_version: Count
+    peer_boot: Id
+    peer_version: Count
+
+
+class Traffic(WireModel):
+    """What was published of one kind."""
+
+    messages: Count
+    bytes: Count
+
+
+class StatusMessage(Message):
+    """How far a robot is.
+
+    Attributes
+    ----------
+    stamp
+        When it was said [s since 1970].
+    scans_total
+        How many scans there are to come in all, where known.
+    compared
+        By peer, for the pairs this robot compared.
+    sent
+        By kind of message: ``map``, ``alignment``, ``status``.
+    """
+
+    format: ClassVar[str] = "mapweave/status-message/1"
+
+    robot: Id
+    boot: Id
+    stamp: Number
+    state: Literal["mapping", "finished"]
+    scans_seen: Count
+    scans_placed: Count
+    scans_total: Count | None = None
+    components: Count
+    submaps: Count
+    map_version: Count
+    compared: dict[Id, Compared] = Field(default_factory=dict, max_length=MAX_PEERS)
+    sent: dict[Label, Traffic] = Field(default_factory=dict, max_length=16)

@@ -1,0 +1,246 @@
+"""Who compares what, when: no clock, no network."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapweave.maps import Alignment, Decision, RobotMap
+from mapweave_agent.comparison_schedule import Comparison, ComparisonSchedule
+from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
+from mapweave_protocol.wire.messages import AlignmentMessage, Compared, MapVersion
+from mapweave_protocol.wire.pairs import responsible
+
+PARAMETERS = AgentParameters(comparison_interval=5.0, comparison_rest=2.0)
+FIRST = responsible("a", "b")
+SECOND = "b" if FIRST == "a" else "a"
+
+
+def a_map(robot: str, version: int, boot: str = "x") -> RobotMap:
+    return RobotMap(robot, boot, version, ())
+
+
+def plan_of(robot: str, peer: str) -> ComparisonSchedule:
+    plan = ComparisonSchedule(robot, PARAMETERS)
+    plan.own_map(a_map(robot, 1), finished=False)
+    plan.peer_here(peer, "x")
+    plan.peer_map(a_map(peer, 1))
+    return plan
+
+
+def alignment(decision: Decision) -> Alignment:
+    return Alignment("a/0", "b/0", np.zeros(3), decision, 0.5, "so")
+
+
+def found(comparison: Comparison, author: str, *alignments: Alignment) -> AlignmentMessage:
+    versions = MapVersion.of(comparison.reference), MapVersion.of(comparison.other)
+    return AlignmentMessage.pack(author, *versions, alignments)
+
+
+def test_of_two_only_the_responsible_one_compares() -> None:
+    assert plan_of(FIRST, SECOND).begin(0.0) is not None
+    assert plan_of(SECOND, FIRST).begin(0.0) is None
+
+
+def test_the_smaller_id_is_the_reference_whoever_compares() -> None:
+    for robot, peer in (("a", "b"), ("b", "a")):
+        plan = plan_of(robot, peer)
+        plan.peer_gone(peer, "x")
+        comparison = plan.begin(0.0)
+        assert comparison is not None
+        assert (comparison.reference.robot, comparison.other.robot) == ("a", "b")
+
+
+def test_when_the_responsible_one_is_gone_the_other_takes_over() -> None:
+    plan = plan_of(SECOND, FIRST)
+    plan.peer_gone(FIRST, "x")
+    assert plan.begin(0.0) is not None
+
+
+def test_nobody_takes_over_from_one_whose_token_is_still_to_come() -> None:
+    plan = ComparisonSchedule(SECOND, PARAMETERS)
+    plan.own_map(a_map(SECOND, 1), finished=False)
+    plan.peer_map(a_map(FIRST, 1))
+    assert plan.begin(0.0) is None
+
+
+def test_nobody_takes_over_while_another_run_is_alive() -> None:
+    plan = plan_of(SECOND, FIRST)
+    plan.peer_here(FIRST, "y")
+    plan.peer_gone(FIRST, "x")
+    assert plan.begin(0.0) is None
+
+
+def test_what_the_one_who_is_gone_had_compared_is_not_compared_again() -> None:
+    first, second = plan_of(FIRST, SECOND), plan_of(SECOND, FIRST)
+    comparison = first.begin(0.0)
+    assert comparison is not None
+    second.learned(found(comparison, FIRST))
+    second.peer_gone(FIRST, "x")
+    assert second.begin(0.0) is None
+    second.own_map(a_map(SECOND, 2), finished=False)
+    assert second.begin(0.0) is not None
+
+
+def test_the_same_versions_are_compared_once() -> None:
+    plan = plan_of(FIRST, SECOND)
+    comparison = plan.begin(0.0)
+    assert comparison is not None
+    plan.done(comparison, 1.0, 1.0)
+    assert plan.begin(1e9) is None
+    assert plan.idle
+    assert plan.published == {SECOND: Compared(own_version=1, peer_boot="x", peer_version=1)}
+
+
+def test_robots_that_were_joined_once_have_met_whoever_found_it() -> None:
+    for robot, peer in ((FIRST, SECOND), (SECOND, FIRST)):
+        for learns in (True, False):
+            plan = plan_of(robot, peer)
+            plan.peer_gone(peer, "x")
+            comparison = plan.begin(0.0)
+            assert comparison is not None
+            assert not plan.have_met(comparison)
+            if learns:
+                plan.learned(found(comparison, peer, alignment("accepted")))
+            else:
+                plan.done(comparison, 1.0, 1.0, [alignment("accepted")])
+            plan.done(comparison, 2.0, 1.0, [alignment("refused")])
+            assert plan.have_met(comparison)
+
+
+def test_robots_that_were_not_joined_have_not_met() -> None:
+    plan = plan_of(FIRST, SECOND)
+    comparison = plan.begin(0.0)
+    assert comparison is not None
+    plan.done(comparison, 1.0, 1.0, [alignment("ambiguous"), alignment("refused")])
+    plan.done(comparison, 1.0, 1.0)
+    assert not plan.have_met(comparison)
+
+
+def test_who_met_another_run_of_a_robot_has_not_met_this_one() -> None:
+    plan = plan_of(FIRST, SECOND)
+    comparison = plan.begin(0.0)
+    assert comparison is not None
+    plan.done(comparison, 1.0, 1.0, [alignment("accepted")])
+    plan.peer_map(a_map(SECOND, 1, boot="y"))
+    anew = plan.begin(1e9)
+    assert anew is not None
+    assert not plan.have_met(anew)
+
+
+def test_while_robots_map_a_pair_rests_between_comparisons() -> None:
+    plan = plan_of(FIRST, SECOND)
+    comparison = plan.begin(0.0)
+    assert comparison is not None
+    plan.done(comparison, now=10.0, took=4.0)
+    plan.own_map(a_map(FIRST, 2), finished=False)
+    assert plan.begin(17.9) is None
+    assert not plan.idle
+    assert plan.begin(18.0) is not None
+
+
+def test_the_last_maps_are_compared_at_once() -> None:
+    plan = plan_of(FIRST, SECOND)
+    comparison = plan.begin(0.0)
+    assert comparison is not None
+    plan.done(comparison, now=1.0, took=1.0)
+    plan.own_map(a_map(FIRST, 9), finished=True)
+    plan.peer_map(a_map(SECOND, 7))
+    assert plan.begin(1.0) is None
+    plan.peer_finished(SECOND, "x", 7)
+    last = plan.begin(1.0)
+    assert last is not None
+    assert {m.robot: m.version for m in (last.reference, last.other)} == {FIRST: 9, SECOND: 7}
+
+
+def test_the_map_of_another_run_is_compared_anew() -> None:
+    plan = plan_of(FIRST, SECOND)
+    comparison = plan.begin(0.0)
+    assert comparison is not None
+    plan.done(comparison, 1.0, 1.0)
+    plan.peer_map(a_map(SECOND, 1, boot="y"))
+    assert plan.begin(1e9) is not None
+
+
+def test_pairs_take_turns() -> None:
+    plan = ComparisonSchedule("a", PARAMETERS)
+    peers = [f"p{number}" for number in range(12)]
+    duties = [peer for peer in peers if responsible("a", peer) == "a"]
+    for peer in peers:
+        plan.peer_here(peer, "x")
+        plan.peer_map(a_map(peer, 1))
+    compared = []
+    for turn in range(2 * len(duties)):
+        plan.own_map(a_map("a", turn + 1), finished=False)
+        comparison = plan.begin(100.0 * turn)
+        assert comparison is not None
+        plan.done(comparison, 100.0 * turn, 1.0)
+        compared.append(comparison.peer)
+    assert sorted(compared) == sorted(2 * duties)
+
+
+@dataclass
+class Side:
+    """One of two robots in a simulated exchange."""
+
+    plan: ComparisonSchedule
+    version: int = 0
+    under_way: Comparison | None = None
+    results: list[Comparison] = field(default_factory=list)
+
+
+EVENTS = st.sampled_from(["a maps", "b maps", "a works", "b works", "time"])
+
+
+@given(st.lists(EVENTS, max_size=60))
+@settings(deadline=None)
+def test_in_the_end_the_last_maps_were_compared_by_the_responsible_one_alone(
+    events: list[str],
+) -> None:
+    sides = {robot: Side(ComparisonSchedule(robot, PARAMETERS)) for robot in "ab"}
+    for robot, peer in ("ab", "ba"):
+        sides[robot].plan.peer_here(peer, "x")
+    now = 0.0
+    ending = [*events, "a maps", "b maps", "end", *("a works", "b works", "time") * 4]
+    for event in ending:
+        robot = event[0]
+        if event == "time":
+            now += 3.0
+        elif event == "end":
+            for one, other in ("ab", "ba"):
+                sides[one].plan.own_map(a_map(one, sides[one].version), finished=True)
+                sides[other].plan.peer_finished(one, "x", sides[one].version)
+        elif event.endswith("maps"):
+            sides[robot].version += 1
+            sides[robot].plan.own_map(a_map(robot, sides[robot].version), finished=False)
+            sides["ba"["ab".index(robot)]].plan.peer_map(a_map(robot, sides[robot].version))
+        else:
+            work(sides[robot], now)
+    assert not sides[SECOND].results
+    last = sides[FIRST].results[-1]
+    assert {m.robot: m.version for m in (last.reference, last.other)} == {
+        robot: side.version for robot, side in sides.items()
+    }
+
+
+def work(side: Side, now: float) -> None:
+    """Finish the comparison under way, or begin one."""
+    if side.under_way is not None:
+        side.plan.done(side.under_way, now, 1.0)
+        side.results.append(side.under_way)
+        side.under_way = None
+    else:
+        side.under_way = side.plan.begin(now)
+
+
+def test_a_finished_submap_is_published_at_once_and_growth_at_a_bounded_rate() -> None:
+    plan = PublicationSchedule(interval=2.0)
+    assert plan.due(0.0)
+    plan.published(0.0)
+    assert not plan.due(1.9)
+    assert plan.due(2.0)
+    plan.hurry()
+    assert plan.due(0.1)
+    plan.published(0.1)
+    assert not plan.due(0.2)

@@ -1,0 +1,77 @@
+"""A comparison in a real process of its own."""
+
+import operator
+import os
+import signal
+import time
+
+import numpy as np
+
+from mapweave.fusion.align import align_robots
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
+from mapweave_agent.comparison_schedule import Comparison
+from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
+
+PATIENCE = 60.0  # [s]
+
+
+def outcome_of(comparer: ComparisonWorker) -> ComparisonOutcome:
+    deadline = time.monotonic() + PATIENCE
+    while (outcome := comparer.take()) is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return outcome
+
+
+def corner(robot: str) -> RobotMap:
+    segments = np.array([[0, 0, 1, 0], [1, 0, 1, 1]], dtype=float)
+    lines = LineMap(segments, np.zeros(2, dtype=np.int64), np.ones(2, dtype=np.int64))
+    return RobotMap(robot, "x", 1, (Submap(0, 0, np.zeros(3), lines, Trajectory.empty()),))
+
+
+COMPARISON = Comparison("b", corner("a"), corner("b"))
+
+
+def test_what_comes_back_is_what_the_function_returns() -> None:
+    with ComparisonWorker(align_robots) as comparer:
+        comparer.start(COMPARISON)
+        assert comparer.busy
+        outcome = outcome_of(comparer)
+    assert not comparer.busy
+    assert outcome.comparison is COMPARISON
+    (expected,) = align_robots(corner("a"), corner("b"))
+    assert outcome.alignments is not None
+    (alignment,) = outcome.alignments
+    assert (alignment.decision, alignment.reason) == (expected.decision, expected.reason)
+
+
+def test_an_error_is_an_outcome_and_the_next_comparison_goes_on() -> None:
+    with ComparisonWorker(operator.mul) as comparer:
+        for _ in range(2):
+            comparer.start(COMPARISON)
+            outcome = outcome_of(comparer)
+            assert outcome.alignments is None
+            assert "TypeError" in outcome.failure
+
+
+def test_a_process_that_was_killed_is_an_outcome_and_is_replaced() -> None:
+    with ComparisonWorker(align_robots) as comparer:
+        comparer.start(COMPARISON)
+        os.kill(comparer.pid, signal.SIGKILL)
+        outcomes = [outcome_of(comparer)]
+        comparer.start(COMPARISON)
+        outcomes.append(outcome_of(comparer))
+    assert [outcome.alignments is None for outcome in outcomes] == [True, False]
+    assert "-9" in outcomes[0].failure
+
+
+def test_the_process_ends_with_its_context() -> None:
+    with ComparisonWorker(align_robots) as comparer:
+        pid = comparer.pid
+        os.kill(pid, 0)
+        comparer.start(COMPARISON)
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return
+    raise AssertionError(f"process {pid} is still there")

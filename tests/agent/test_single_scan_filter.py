@@ -1,0 +1,47 @@
+"""Scans that fit nothing: who hears of them."""
+
+import numpy as np
+
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
+from mapweave_agent.single_scan_filter import without_strays
+
+
+def robot_map(*submaps: tuple[int, int]) -> RobotMap:
+    """Return a map of submaps, each with its component and number of scans."""
+    return RobotMap(
+        "a",
+        "boot",
+        1,
+        tuple(
+            Submap(number, component, np.zeros(3), LineMap.empty(), trajectory(scans))
+            for number, (component, scans) in enumerate(submaps)
+        ),
+    )
+
+
+def trajectory(scans: int) -> Trajectory:
+    return Trajectory(np.arange(scans), np.zeros(scans), np.zeros((scans, 3)))
+
+
+def ids(of: RobotMap) -> list[int]:
+    return [submap.id for submap in without_strays(of).submaps]
+
+
+def test_a_component_of_one_scan_is_left_out() -> None:
+    assert ids(robot_map((0, 9), (1, 1), (2, 4))) == [0, 2]
+
+
+def test_a_submap_of_one_scan_among_others_of_its_component_stays() -> None:
+    assert ids(robot_map((0, 9), (0, 1))) == [0, 1]
+
+
+def test_two_scans_that_fit_each_other_stay() -> None:
+    assert ids(robot_map((0, 9), (1, 2))) == [0, 1]
+
+
+def test_the_first_scan_of_all_stays_while_there_is_no_other() -> None:
+    assert ids(robot_map((0, 1))) == [0]
+
+
+def test_a_map_of_nothing_is_one_of_nothing() -> None:
+    assert ids(robot_map()) == []

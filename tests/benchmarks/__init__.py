@@ -1,1 +1,0 @@
-"""Measures mapweave on real logs: ``python -m tests.benchmarks``."""

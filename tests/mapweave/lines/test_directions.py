@@ -1,0 +1,144 @@
+"""Main directions are the significant peaks of the direction histogram (paper, VI-A)."""
+
+import numpy as np
+import pytest
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.lines.directions import (
+    DIRECTED_PERIOD,
+    LINE_PERIOD,
+    direction_histogram,
+    likely_turns,
+    line_difference,
+    main_directions,
+    nearest_direction,
+)
+from tests.mapweave.buildings import BUILDING, part
+
+
+def walls(degrees: FloatArray, length: float = 1.0) -> FloatArray:
+    """Return segments of the given directions, all from the origin."""
+    angle = np.deg2rad(degrees)
+    ends = length * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.hstack([np.zeros_like(ends), ends])
+
+
+def building(seed: int, *turns: float) -> FloatArray:
+    """Return walls of rectangular wings turned by `turns` [degrees], with 1° of noise."""
+    random = np.random.default_rng(seed)
+    directions = np.concatenate([turn + 90 * random.integers(0, 4, 80) for turn in turns])
+    return walls(directions + random.normal(0, 1, len(directions)))
+
+
+def test_the_histogram_holds_each_segment_by_its_length() -> None:
+    segments = np.concatenate([walls(np.array([20.0]), 3.0), walls(np.array([110.0]), 1.0)])
+    histogram = direction_histogram(segments)
+    assert histogram.sum() == pytest.approx(4.0)
+    assert histogram[15:26].sum() == pytest.approx(3.0, rel=1e-3)
+    assert histogram[105:116].sum() == pytest.approx(1.0, rel=1e-3)
+
+
+def test_weights_stand_in_for_lengths() -> None:
+    segments = walls(np.array([20.0, 110.0]))
+    histogram = direction_histogram(segments, np.array([1.0, 5.0]))
+    assert histogram.sum() == pytest.approx(6.0)
+    assert np.argmax(histogram) == 110
+
+
+def test_both_faces_of_a_wall_count_for_one_line_but_for_two_directions() -> None:
+    faces = walls(np.array([30.0, 210.0]))
+    lines = direction_histogram(faces, bins=180, period=LINE_PERIOD)
+    directed = direction_histogram(faces, bins=360, period=DIRECTED_PERIOD)
+    assert np.argmax(lines) == 30
+    assert lines[20:41].sum() == pytest.approx(2.0, rel=1e-3)
+    assert directed[20:41].sum() == pytest.approx(1.0, rel=1e-3)
+    assert directed[200:221].sum() == pytest.approx(1.0, rel=1e-3)
+
+
+def test_the_histogram_is_circular() -> None:
+    histogram = direction_histogram(walls(np.array([179.9, 0.1])))
+    assert np.argmax(histogram) == 0
+    assert histogram[1] == pytest.approx(histogram[-1])
+
+
+def test_turning_the_building_turns_the_histogram() -> None:
+    segments = building(1, 10.0)
+    turned = se2.transform_segments([3.0, -2.0, np.deg2rad(25.0)], segments)
+    directed = direction_histogram(segments, bins=360, period=DIRECTED_PERIOD)
+    shifted = direction_histogram(turned, bins=360, period=DIRECTED_PERIOD)
+    np.testing.assert_allclose(shifted, np.roll(directed, 25), atol=0.5)
+
+
+def test_round_walls_have_no_main_direction() -> None:
+    assert len(main_directions(walls(np.arange(0.0, 360.0, 3.0)))) == 0
+
+
+def test_nothing_has_no_main_direction() -> None:
+    assert len(main_directions(np.empty((0, 4)))) == 0
+
+
+def test_two_wings_at_30_degrees_have_four_main_directions() -> None:
+    found = np.rad2deg(main_directions(building(2, 0.0, 30.0)))
+    expected = np.array([0.0, 30.0, 90.0, 120.0])
+    assert len(found) == len(expected)
+    error = np.rad2deg(line_difference(np.deg2rad(found[:, None]), np.deg2rad(expected)))
+    assert (np.abs(error).min(axis=0) < 0.5).all()
+
+
+def test_a_main_direction_is_found_between_the_bins() -> None:
+    found = main_directions(walls(np.array([40.3, 40.5, 130.4])))
+    np.testing.assert_allclose(np.rad2deg(found), [40.4, 130.4], atol=1e-6)
+
+
+def test_main_directions_lie_in_the_half_circle() -> None:
+    found = main_directions(walls(np.array([-0.4, 0.1, 0.2])))
+    assert (found >= 0).all()
+    assert (found < np.pi).all()
+
+
+def test_main_directions_turn_with_the_building() -> None:
+    segments = building(3, 5.0, 50.0)
+    before = main_directions(segments)
+    random = np.random.default_rng(3)
+    for motion in random.uniform(-3, 3, (5, 3)):
+        after = main_directions(se2.transform_segments(motion, segments))
+        assert len(after) == len(before)
+        error = line_difference(after[:, None], before + motion[2])
+        assert (np.abs(error).min(axis=0) < np.deg2rad(0.3)).all()
+
+
+def test_drift_makes_no_direction_of_its_own() -> None:
+    """Accumulated errors spread a direction; they do not lead to a peak (paper, VI)."""
+    drifting = walls(np.concatenate([np.linspace(0, 4, 60), 90 + np.linspace(0, 4, 60)]))
+    assert len(main_directions(drifting)) == 2
+
+
+def test_the_nearest_direction_is_that_of_a_line() -> None:
+    directions = np.deg2rad([2.0, 92.0])
+    found = nearest_direction(np.deg2rad([181.0, -90.0, 45.0]), directions, np.deg2rad(5.0))
+    np.testing.assert_allclose(found[:2], directions)
+    assert np.isnan(found[2])
+
+
+def test_no_direction_is_near_when_there_is_none() -> None:
+    assert np.isnan(nearest_direction(1.0, np.empty(0), 1.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_true_turn_is_among_the_likely_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(-np.pi, np.pi)
+    halves = part(BUILDING, 0, 18).segments, part(BUILDING, 8, 30).segments
+    turned = se2.transform_segments(np.array([3.0, -1.0, -turn]), halves[1])
+    found = likely_turns(halves[0], turned, 4, 0.17)
+    assert np.abs(se2.wrap(found - turn)).min() < np.radians(1.5)
+    apart = np.abs(se2.wrap(found[:, None] - found)) + np.pi * np.eye(len(found))
+    assert apart.min() > 0.17
+
+
+def test_visible_sides_tell_half_a_turn_from_none() -> None:
+    """Three walls of a room, seen from inside: only one turn lays them on themselves."""
+    walls = np.array([[0.0, 0, 6, 0], [6, 0, 6, 4], [0, 4, 0, 0]])
+    assert abs(likely_turns(walls, walls, 4, 0.17)[0]) < np.radians(1)
+    assert abs(se2.wrap(likely_turns(walls, walls[:, [2, 3, 0, 1]], 4, 0.17)[0] - np.pi)) < 0.02

@@ -1,0 +1,47 @@
+"""After a miss only what can be told from look-alikes counts."""
+
+import numpy as np
+import pytest
+
+from mapweave.geometry.arrays import FloatArray
+from mapweave.mapping.tracking.acceptance import AcceptanceParameters, ScanMatch, tell_apart
+from mapweave.mapping.tracking.local_map import ScanEvidence
+
+P = AcceptanceParameters()
+HELD, OPEN = np.diag([30.0, 6.0, 50.0]), np.diag([30.0, 0.2, 50.0])
+
+
+def pose(
+    x: float,
+    explained: float,
+    contradicted: float = 0.0,
+    *,
+    turn: float = 0.0,
+    information: FloatArray = HELD,
+) -> ScanMatch:
+    evidence = ScanEvidence(explained, contradicted, 0.0)
+    return ScanMatch(np.array([x, 0.0, turn]), evidence, information)
+
+
+def test_a_pose_that_is_held_and_explains_most_counts() -> None:
+    best, other = pose(0.5, 0.8), pose(1.5, 0.3, 0.2)
+    assert tell_apart([other, best], P.novelty, P) == [best]
+
+
+def test_what_one_may_slide_along_or_explains_too_little_does_not_count() -> None:
+    assert tell_apart([pose(0.5, 0.9, information=OPEN)], P.novelty, P) == []
+    assert tell_apart([pose(0.5, 0.55, 0.3)], P.novelty, P) == []
+    assert tell_apart([], P.novelty, P) == []
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+def test_nothing_counts_where_a_different_pose_is_worth_more(turn: float) -> None:
+    """In a bare corridor many fit; the one that a door frame holds is so by chance."""
+    held, better = pose(0.5, 0.7), pose(1.5 - turn, 0.8, turn=turn, information=OPEN)
+    assert tell_apart([held], P.novelty, P) == [held]
+    assert tell_apart([held, better], P.novelty, P) == []
+
+
+def test_a_pose_next_to_the_best_is_not_different() -> None:
+    best, near = pose(0.5, 0.7), pose(0.7, 0.75, information=OPEN)
+    assert tell_apart([best, near], P.novelty, P) == [best]

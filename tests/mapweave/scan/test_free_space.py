@@ -1,0 +1,106 @@
+"""What was seen to be free: a room is, less a margin; what lies behind a wall is not."""
+
+import numpy as np
+import pytest
+import shapely
+from numpy.random import Generator
+from shapely.geometry import Polygon
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, scan_free_space, unite
+from mapweave.scan.scan import Scan
+from tests.mapweave.buildings import (
+    AROUND,
+    BUILDING,
+    FRONT,
+    cast,
+    random_pose,
+    rectangle,
+    walls_of,
+)
+
+P = FreeSpaceParameters()
+CORNERS = rectangle(0, 0, 6, 4)
+ROOM = walls_of(CORNERS)
+
+
+def test_a_room_seen_from_several_places_is_free_up_to_the_margin() -> None:
+    places = [[1, 1, 0], [5, 1, 2], [5, 3, -2], [1, 3, 1], [3, 2, 0]]
+    pieces = [
+        scan_free_space(cast(ROOM, pose, angles=AROUND), np.array(pose, dtype=float), P)
+        for pose in places
+    ]
+    free = unite(pieces, P)
+    room = Polygon(CORNERS)
+    assert room.buffer(-P.margin + P.simplification).covers(free)  # never nearer to a wall
+    shrunk = room.buffer(-2.5 * P.margin)
+    assert shapely.difference(shrunk, free).area < 0.01 * shrunk.area
+
+
+def test_nothing_outside_a_building_is_ever_free(rng: Generator) -> None:
+    inside = Polygon(BUILDING)
+    for x in rng.uniform(0.5, 29.5, 15):
+        pose = np.array([x, rng.uniform(0.4, 1.8), rng.uniform(-np.pi, np.pi)])
+        free = scan_free_space(cast(walls_of(BUILDING), pose, noise=rng), pose, P)
+        assert free.area > 1
+        assert shapely.difference(free, inside).area == pytest.approx(0, abs=1e-3)
+
+
+def test_free_space_ends_where_sight_ends() -> None:
+    hall = walls_of(rectangle(-50, -50, 50, 50))
+    free = scan_free_space(cast(hall, [0, 0, 0], angles=AROUND, max_range=200), np.zeros(3), P)
+    corners = shapely.get_coordinates(free)
+    assert np.hypot(*corners.T).max() <= P.sight
+    assert free.area == pytest.approx(np.pi * (P.sight - P.margin) ** 2, rel=0.02)
+
+
+def test_beams_that_did_not_come_back_leave_a_gap() -> None:
+    """Not a beam nor its neighbours: 10 lost ones open a wedge of 11 steps."""
+    scan = cast(ROOM, [1, 2, 0])
+    ranges = scan.ranges.copy()
+    ranges[85:95] = np.nan
+    whole = scan_free_space(scan, np.zeros(3), P)
+    free = scan_free_space(Scan(0, 0.0, scan.angles, ranges), np.zeros(3), P)
+    wedge = np.radians([-4.9, 3.9])
+    for bearing in wedge:
+        assert whole.contains(shapely.Point(3 * np.cos(bearing), 3 * np.sin(bearing)))
+        assert not free.contains(shapely.Point(3 * np.cos(bearing), 3 * np.sin(bearing)))
+    for bearing in np.radians([-8.0, 8.0]):
+        assert free.contains(shapely.Point(3 * np.cos(bearing), 3 * np.sin(bearing)))
+
+
+def test_a_blind_scan_frees_nothing() -> None:
+    blind = Scan(0, 0.0, FRONT, np.full(len(FRONT), np.nan))
+    assert scan_free_space(blind, np.zeros(3), P).is_empty
+
+
+def test_free_space_moves_with_the_sensor(rng: Generator) -> None:
+    pose, scan = random_pose(rng), cast(ROOM, [2, 1, 0.3])
+    here = scan_free_space(scan, np.zeros(3), P)
+    there = scan_free_space(scan, pose, P)
+    back = shapely.transform(there, lambda p: se2.transform_points(se2.inverse(pose), p))
+    # The outline may be thinned at other corners, by half the tolerance each.
+    assert back.hausdorff_distance(here) < P.simplification
+
+
+def test_rings_have_no_holes_and_cover_the_same_area() -> None:
+    square = Polygon(
+        rectangle(0, 0, 9, 9), [rectangle(1, 1, 2, 2), rectangle(4, 4, 6, 7), rectangle(7, 1, 8, 3)]
+    )
+    outlines = rings(square)
+    assert all(Polygon(ring).is_valid and not np.allclose(ring[0], ring[-1]) for ring in outlines)
+    assert sum(Polygon(ring).area for ring in outlines) == pytest.approx(square.area)
+    assert shapely.symmetric_difference(from_rings(outlines), square).area < 1e-9
+
+
+def test_overlapping_rings_are_united_and_slivers_ignored() -> None:
+    overlapping = (rectangle(0, 0, 4, 4), rectangle(2, 0, 6, 4), np.array([[0.0, 0.0], [1, 1]]))
+    assert from_rings(overlapping).area == pytest.approx(24)
+    assert from_rings([]).is_empty
+
+
+@pytest.mark.parametrize("crumb", [rectangle(20, 0, 20.2, 0.2), rectangle(20, 0, 20.001, 3)])
+def test_crumbs_are_left_out_of_the_union(crumb: FloatArray) -> None:
+    united = unite([Polygon(rectangle(0, 0, 4, 4)), Polygon(crumb)], P)
+    assert united.area == pytest.approx(16)

@@ -1,0 +1,88 @@
+"""A beam proves the space before its return to be free, and nothing else."""
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from mapweave.geometry import se2
+from mapweave.scan.scan import Scan
+from mapweave.scan.visibility import clear_ranges, seen_through
+from tests.mapweave.buildings import AROUND, FRONT, cast, random_pose, rectangle, walls_of
+
+# The sensor stands at (1, 2) in a room 6 m by 4 m and looks along x: the wall ahead is 5 m away.
+ROOM = walls_of(rectangle(0, 0, 6, 4))
+SCAN = cast(ROOM, [1, 2, 0])
+
+
+@pytest.mark.parametrize(
+    ("point", "through"),
+    [((4.6, 0), True), ((4.9, 0), False), ((5.1, 0), False), ((7, 0), False), ((0, 1.6), True),
+     ((0, 1.9), False), ((0, 2.5), False), ((-0.5, 0), False)],
+)  # fmt: skip
+def test_points_well_before_a_wall_are_seen_through_and_others_are_not(
+    point: tuple[float, float], through: bool
+) -> None:
+    """Before by more than the margin, 0.3 m; behind the wall, or behind the sensor: unknown."""
+    assert seen_through(SCAN, np.array([point]), 0.3, 20.0).tolist() == [through]
+
+
+def test_a_beam_that_did_not_come_back_proves_nothing_nor_do_its_neighbours() -> None:
+    ranges = SCAN.ranges.copy()
+    ranges[90] = np.nan  # straight ahead
+    scan = Scan(0, 0.0, SCAN.angles, ranges)
+    points = np.column_stack([np.cos(FRONT), np.sin(FRONT)])  # all 1 m away
+    through = seen_through(scan, points, 0.3, 20.0)
+    assert np.flatnonzero(~through).tolist() == [89, 90, 91]
+
+
+def test_beyond_its_sight_a_beam_proves_nothing() -> None:
+    assert seen_through(SCAN, np.array([[2.9, 0.0]]), 0.0, 3.0).all()
+    assert not seen_through(SCAN, np.array([[3.1, 0.0]]), 0.0, 3.0).any()
+
+
+def test_a_margin_may_be_given_for_each_point() -> None:
+    points = np.array([[4.5, 0.0], [4.5, 0.0]])
+    assert seen_through(SCAN, points, np.array([0.4, 0.6]), 20.0).tolist() == [True, False]
+
+
+def test_space_is_clear_as_far_as_a_beam_and_both_its_neighbours_reach() -> None:
+    scan = Scan(0, 0.0, np.linspace(-1, 1, 5), np.array([3.0, 1.0, 4.0, 5.0, 6.0]))
+    np.testing.assert_array_equal(clear_ranges(scan, 5.5), [1.0, 1.0, 1.0, 4.0, 5.0])
+
+
+@pytest.mark.parametrize("first", [-np.pi, 0.0, np.pi / 3])
+@pytest.mark.parametrize("beams", [360, 361])
+def test_it_does_not_matter_where_the_turn_of_a_lidar_begins(
+    first: float, beams: int, rng: Generator
+) -> None:
+    """Beams all round, at 5 m: every point nearer is seen through, across the seam as well."""
+    angles = first + np.radians(1.0) * np.arange(beams)
+    scan = Scan(0, 0.0, angles, np.full(beams, 5.0))
+    bearing, distance = rng.uniform(-np.pi, np.pi, 200), rng.uniform(0.5, 4.9, 200)
+    points = distance[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+    assert seen_through(scan, points, 0.0, 20.0).all()
+
+
+def test_nothing_inside_a_room_is_seen_through_from_any_place_in_it_but_its_free_space(
+    rng: Generator,
+) -> None:
+    """Brute force over places: what is seen through lies inside, the margin from every wall."""
+    for _ in range(10):
+        pose = np.array([*rng.uniform([0.5, 0.5], [5.5, 3.5]), rng.uniform(-np.pi, np.pi)])
+        scan = cast(ROOM, pose, angles=AROUND)
+        points = rng.uniform([-2, -2], [8, 6], (300, 2))
+        through = seen_through(scan, se2.transform_points(se2.inverse(pose), points), 0.3, 20.0)
+        inside = ((points > 0) & (points < [6, 4])).all(axis=1)
+        deep = ((points > 0.5) & (points < [5.5, 3.5])).all(axis=1)
+        assert not through[~inside].any()
+        away = np.hypot(*(points - pose[:2]).T) > 0.3
+        assert through[deep & away].mean() > 0.97  # all but the seam behind the sensor
+
+
+def test_what_is_seen_through_does_not_depend_on_where_the_world_is(rng: Generator) -> None:
+    moved = random_pose(rng)
+    pose = np.array([1.0, 2.0, 0.4])
+    points = rng.uniform(-5, 5, (100, 2))
+    here = seen_through(cast(ROOM, pose), points, 0.3, 20.0)
+    there = cast(se2.transform_segments(moved, ROOM), se2.compose(moved, pose))
+    np.testing.assert_array_equal(here, seen_through(there, points, 0.3, 20.0))

@@ -1,0 +1,159 @@
+"""Robots that were joined are woven together: each submap lies where it fits all others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from mapweave.geometry import se2
+from mapweave.team.alignment_graph import Cluster
+from mapweave.geometry.arrays import FloatArray
+from mapweave.assembly import place, unite_lines
+from mapweave.team.joint_map import build_team_map
+from mapweave.mapping.loop_closing import LoopCloser
+from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.team.joint_optimization import JointOptimizer, JointOptimizationParameters
+from tests.mapweave.buildings import corridor, part, random_pose
+
+LONG = corridor(
+    60,
+    [(1, 2, 4.0), (4, 10, 1.5), (17, 22, 2.0), (30, 32, 1.5), (40, 43, 2.5), (52, 53, 1.0)],
+    [(3, 7, 3.2), (13, 16, 2.4), (25, 28, 3.0), (36, 37, 0.8), (46, 51, 1.2), (55, 58.5, 0.7)],
+)
+WHOLE = JointOptimizer(JointOptimizationParameters(newest=True))
+BENT = 0.008  # [rad] a submap: what tracking may err by; 1 m between both ends of 60 m
+
+
+def submaps(bend: float, frame: FloatArray) -> list[Submap]:
+    """Return the long corridor in ten submaps, each turned by `bend` [rad] more than it is."""
+    pose, found = frame, []
+    for k in range(10):
+        low = 6.0 * k
+        own = place(part(LONG, max(low - 2, 0), min(low + 8, 60)), np.array([-low, 0, 0]))
+        path = Trajectory(np.arange(2), np.zeros(2), np.array([[0.0, 1, 0], [6.0, 1, 0]]))
+        found.append(Submap(k, 0, pose, own, path))
+        pose = se2.compose(pose, np.array([6.0, 0, bend]))
+    return found
+
+
+def team(
+    bend: float, frames: FloatArray
+) -> tuple[Cluster, dict[str, list[Submap]], list[Alignment]]:
+    """Return two robots, bent against each other, that were aligned where submap 4 is."""
+    robots = {"a/0": submaps(bend, frames[0]), "b/0": submaps(-bend, frames[1])}
+    there, here = (robot[4].pose for robot in robots.values())
+    transform = se2.compose(there, se2.inverse(here))
+    alignment = Alignment("a/0", "b/0", transform, "accepted", 0.99, "so")
+    return Cluster({"a/0": np.zeros(3), "b/0": transform}, 0.99), robots, [alignment]
+
+
+def rigid(robot: list[Submap]) -> LineMap:
+    return unite_lines([place(s.map, s.pose) for s in robot])
+
+
+def apart(cluster: Cluster, lines: dict[str, LineMap]) -> FloatArray:
+    """(n,) [m] between the same ends of walls in the two robots' maps."""
+    first, second = (
+        se2.transform_points(cluster.poses[name], lines[name].segments.reshape(-1, 2))
+        for name in ("a/0", "b/0")
+    )
+    distances: FloatArray = np.hypot(*(first - second).T)
+    return distances
+
+
+@pytest.fixture
+def frames(rng: Generator) -> FloatArray:
+    return np.array([random_pose(rng), random_pose(rng)])
+
+
+def test_maps_bent_against_each_other_come_to_lie_on_each_other(frames: FloatArray) -> None:
+    cluster, robots, alignments = team(BENT, frames)
+    before = apart(cluster, {name: rigid(robot) for name, robot in robots.items()})
+    assert before.max() > 0.5
+    woven, lines = WHOLE.weave(cluster, robots, alignments)
+    assert apart(woven, lines).max() < 0.1
+    np.testing.assert_array_equal(woven.poses["a/0"], 0.0)
+    assert woven.confidence == cluster.confidence
+
+
+def test_maps_that_fit_stay_where_they_are(frames: FloatArray) -> None:
+    cluster, robots, alignments = team(0.0, frames)
+    woven, lines = JointOptimizer().weave(cluster, robots, alignments)
+    np.testing.assert_allclose(woven.poses["b/0"], cluster.poses["b/0"], atol=0.02)
+    for name, robot in robots.items():
+        np.testing.assert_allclose(lines[name].segments, rigid(robot).segments, atol=0.03)
+
+
+def test_the_frames_of_the_components_change_nothing(frames: FloatArray) -> None:
+    distances = []
+    for each in (frames, np.zeros((2, 3))):
+        cluster, robots, alignments = team(BENT, each)
+        distances.append(apart(*JointOptimizer().weave(cluster, robots, alignments)))
+    np.testing.assert_allclose(distances[0], distances[1], atol=0.02)
+
+
+def test_robots_that_are_nowhere_near_each_other_stay_rigid(frames: FloatArray) -> None:
+    cluster, robots, _ = team(BENT, frames)
+    far = Cluster({"a/0": np.zeros(3), "b/0": np.array([500.0, 0.0, 0.0])}, cluster.confidence)
+    woven, lines = JointOptimizer().weave(far, robots, [])
+    assert woven is far
+    np.testing.assert_array_equal(lines["b/0"].segments, rigid(robots["b/0"]).segments)
+
+
+def test_a_submap_that_grows_still_goes_along_with_the_one_before(frames: FloatArray) -> None:
+    cluster, robots, alignments = team(BENT, frames)
+    alone, lines = JointOptimizer().weave(cluster, robots, alignments)
+    others = {name: robot[:-1] for name, robot in robots.items()}
+    woven, rest = WHOLE.weave(cluster, others, alignments)
+    assert apart(woven, rest).max() < 0.1 < apart(alone, lines).max() < 0.2
+
+
+def test_what_was_compared_once_is_not_compared_again(
+    frames: FloatArray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A version of the joint map is made every few seconds, of nearly the same submaps."""
+    cluster, robots, alignments = team(BENT, frames)
+    weaver = JointOptimizer()
+    first, _ = weaver.weave(cluster, robots, alignments)
+    monkeypatch.delattr(LoopCloser, "compare_two")
+    again, _ = weaver.weave(cluster, robots, alignments)
+    np.testing.assert_array_equal(again.poses["b/0"], first.poses["b/0"])
+
+
+def test_what_is_not_compared_at_once_is_compared_the_next_time(frames: FloatArray) -> None:
+    """A coordinator that starts anew makes a version all the same."""
+    cluster, robots, alignments = team(BENT, frames)
+    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=5))
+    before = [apart(*weaver.weave(cluster, robots, alignments)).max() for _ in range(12)]
+    assert before[0] > before[-1]
+    assert before[-1] < 0.1
+
+
+def test_three_robots_and_one_that_saw_nothing_are_woven(frames: FloatArray) -> None:
+    """The third has walked through it all again, and the fourth is blind."""
+    cluster, robots, alignments = team(BENT, frames)
+    third = [replace(s, id=s.id + 3 * (s.id > 4)) for s in submaps(0.0, frames[1])]  # was lost once
+    blind = [Submap(0, 0, np.zeros(3), LineMap.empty(), Trajectory.empty())]
+    everyone = {**robots, "c/0": third, "d/0": blind}
+    there = se2.compose(robots["a/0"][4].pose, se2.inverse(third[4].pose))
+    links = [
+        *alignments,
+        Alignment("a/0", "c/0", there, "accepted", 0.99, "so"),
+        Alignment("a/0", "d/0", there, "accepted", 0.99, "so"),
+    ]
+    poses = {**cluster.poses, "c/0": there, "d/0": there}
+    woven, lines = WHOLE.weave(Cluster(poses, 0.99), everyone, links)
+    assert apart(woven, lines).max() < 0.12
+    assert np.isfinite(np.array(list(woven.poses.values()))).all()
+    np.testing.assert_allclose(woven.poses["d/0"], there, atol=0.5)
+
+
+def test_a_joint_map_of_bent_robots_has_no_wall_twice(frames: FloatArray) -> None:
+    _, robots, alignments = team(BENT / 2, frames)
+    maps = [RobotMap(name[0], "boot", 1, tuple(robot)) for name, robot in sorted(robots.items())]
+    (component,) = build_team_map(maps, alignments, 1, WHOLE).components
+    drawn = np.hypot(*(component.map.segments[:, 2:] - component.map.segments[:, :2]).T).sum()
+    true = np.hypot(*np.diff(np.vstack([LONG, LONG[:1]]), axis=0).T).sum()
+    assert drawn < 1.03 * true
+    assert (component.segment_confidence > 0.8).mean() > 0.95

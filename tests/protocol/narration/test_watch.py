@@ -1,0 +1,163 @@
+"""The story of a team: what is told, and the command that tells it."""
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zenoh
+
+from mapweave.maps import Alignment, Decision, JointMap, RobotMap
+from mapweave_protocol.link.inbox import Arrival
+from mapweave_protocol.link.session import (
+    declare_joint_publisher,
+    declare_map_publisher,
+    open_session,
+)
+from mapweave_protocol.narration.story import Story
+from mapweave_protocol.narration.watch import Watcher, watch
+from mapweave_protocol.wire import keys
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    JointMapMessage,
+    MapMessage,
+    MapVersion,
+    StatusMessage,
+)
+
+MakeMap = Callable[..., RobotMap]
+MakeJoint = Callable[..., JointMap]
+MAPWEAVE = Path(sys.executable).with_name("mapweave")
+
+
+def decided(decision: Decision) -> AlignmentMessage:
+    a, b = (MapVersion(robot=robot, boot="x", version=1) for robot in "ab")
+    alignment = Alignment("a/0", "b/0", np.zeros(3), decision, 0.5, "look-alike corridors")
+    return AlignmentMessage.pack("a", a, b, [alignment])
+
+
+def status(seen: int, *, finished: bool = False) -> StatusMessage:
+    return StatusMessage(
+        robot="a",
+        boot="b1",
+        stamp=0.0,
+        state="finished" if finished else "mapping",
+        scans_seen=seen,
+        scans_placed=seen,
+        components=1,
+        submaps=1,
+        map_version=1,
+    )
+
+
+def test_a_robot_that_comes_and_goes_is_told_once_each() -> None:
+    story = Story()
+    lines = [*story.appeared("a", "b1"), *story.appeared("a", "b1"), *story.left("a", "b1")]
+    assert lines == ["a is here", "a is gone"]
+
+
+def test_a_run_that_another_one_followed_may_go_untold() -> None:
+    story = Story()
+    lines = [*story.appeared("a", "b1"), *story.appeared("a", "b2"), *story.left("a", "b1")]
+    assert lines == ["a is here", "a is here"]
+
+
+def test_a_decision_is_told_when_it_is_new_with_confidence_and_reason() -> None:
+    story = Story()
+    decisions: list[Decision] = ["ambiguous", "ambiguous", "accepted"]
+    lines = [line for decision in decisions for line in story.aligned(decided(decision))]
+    assert lines == [
+        "a/0 and b/0: ambiguous, confidence 50% (look-alike corridors)",
+        "a/0 and b/0: now accepted, confidence 50% (look-alike corridors)",
+    ]
+
+
+def test_the_end_of_mapping_is_told_once() -> None:
+    story = Story()
+    lines = [
+        *story.status(status(5)),
+        *story.status(status(9, finished=True)),
+        *story.status(status(9, finished=True)),
+    ]
+    assert lines == ["a has finished: 9 scans, 9 placed"]
+
+
+def test_a_version_of_the_joint_map_is_told_once_with_its_components(
+    random_joint: MakeJoint,
+) -> None:
+    watcher = Watcher()
+    payload = encode(JointMapMessage.pack(random_joint(1, 4), "s1"))
+    arrival = Arrival(keys.JOINT_MAP.build(team="t"), payload)
+    lines = list(watcher.tell(arrival))
+    assert lines[0].startswith("joint map 4: a/0 + b/0 (")
+    assert list(watcher.tell(arrival)) == []
+
+
+def test_a_join_that_a_version_does_not_rely_on_is_told_once_with_the_reason() -> None:
+    story = Story()
+    aside, revoked = "set aside: 9 m off what a/0-c/0 says", "revoked in version 3: only 2 m"
+    lines = [
+        line
+        for version, reason in enumerate([aside, aside, revoked, revoked], start=1)
+        for line in story.joined(
+            JointMap(
+                version,
+                (),
+                (Alignment("a/0", "b/0", np.zeros(3), "ambiguous", 0.9, reason),),
+            )
+        )
+        if not line.startswith("joint map")
+    ]
+    assert lines == [
+        "a/0 and b/0: alignment not relied on (9 m off what a/0-c/0 says)",
+        "a/0 and b/0: alignment revoked in version 3 (only 2 m)",
+    ]
+
+
+def test_what_is_no_message_is_not_told() -> None:
+    watcher = Watcher()
+    for key in (keys.MAP.build(team="t", robot="a"), "mapweave/@v1/t/@live/NO ID/1", "elsewhere"):
+        assert list(watcher.tell(Arrival(key, b"junk"))) == []
+
+
+def test_the_command_tells_what_happens_line_by_line(
+    endpoint: str, team: str, random_map: MakeMap, random_joint: MakeJoint
+) -> None:
+    command = [str(MAPWEAVE), "watch", "--team", team, "--connect", endpoint]
+    with (
+        open_session([endpoint], patience=20.0) as session,
+        declare_map_publisher(session, keys.MAP.build(team=team, robot="a")) as maps,
+        declare_joint_publisher(session, keys.JOINT_MAP.build(team=team)) as joints,
+        session.liveliness().declare_token(keys.LIVE.build(team=team, robot="a", boot="b1")),
+    ):
+        maps.put(encode(MapMessage.pack(random_map(1, 2))))
+        joint = replace(random_joint(1, 4), alignments=())
+        joints.put(encode(JointMapMessage.pack(joint, "s1")))
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watching:
+            assert watching.stdout is not None
+            lines = [watching.stdout.readline() for _ in range(3)]
+            watching.send_signal(signal.SIGTERM)
+    assert all(re.match(r"\d\d:\d\d:\d\d ", line) for line in lines)
+    words = sorted(line.split()[1:3] for line in lines)
+    assert words == [["a", "is"], ["a:", "2"], ["joint", "map"]]
+
+
+def test_an_answer_that_is_no_joint_map_is_ignored(
+    endpoint: str, team: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    key = keys.JOINT_QUERY.build(team=team)
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply(key, b"junk")
+
+    with open_session([endpoint]) as session, session.declare_queryable(key, answer):
+        story = watch(team, [endpoint], Watcher(), lambda: None)
+        assert next(iter(story)) is None
+    assert "answer ignored" in caplog.text

@@ -1,0 +1,310 @@
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+
+import msgpack
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapweave.geometry import se2
+from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap, Trajectory
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.wire.codec import MAX_BODY, decode, encode
+from mapweave_protocol.wire.geometry import PackedLines
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    Compared,
+    JointMapMessage,
+    MapMessage,
+    MapVersion,
+    StatusMessage,
+    Traffic,
+)
+from mapweave_protocol.wire.model import Message
+
+MakeMap = Callable[..., RobotMap]
+MakeJoint = Callable[..., JointMap]
+SEEDS = st.integers(0, 2**32 - 1)
+HALF_A_MILLIMETRE = 0.5e-3 + 1e-9
+ALIGNMENT = Alignment(
+    "a/0",
+    "b/12",
+    np.array([1.25, -3.0, 0.1]),
+    "refused",
+    0.125,
+    "too little in common",
+    {"common": 1.5},
+    {"transform": [0.0, 1.0, 2.0], "common": 0.5},
+)
+
+
+def complete_map(robot_map: RobotMap) -> RobotMap:
+    message = decode(MapMessage, encode(MapMessage.pack(robot_map)))
+    submaps = tuple(
+        packed.unpack(place.component, np.array(place.pose))
+        for packed, place in zip(message.submaps, message.places, strict=True)
+    )
+    return RobotMap(message.robot, message.boot, message.version, submaps)
+
+
+def status() -> StatusMessage:
+    compared = {"b": Compared(own_version=3, peer_boot="x", peer_version=7)}
+    return StatusMessage(
+        robot="a",
+        boot="b1",
+        stamp=1.7e9,
+        state="mapping",
+        scans_seen=9,
+        scans_placed=8,
+        components=1,
+        submaps=2,
+        map_version=3,
+        compared=compared,
+        sent={"map": Traffic(messages=2, bytes=999)},
+    )
+
+
+def alignments() -> AlignmentMessage:
+    versions = [MapVersion(robot=robot, boot="x", version=3) for robot in "ab"]
+    return AlignmentMessage.pack("a", versions[0], versions[1], [ALIGNMENT])
+
+
+def messages(make_map: MakeMap, make_joint: MakeJoint) -> list[Message]:
+    joint = JointMapMessage.pack(make_joint(3), series="s1")
+    return [MapMessage.pack(make_map(1)), joint, status(), alignments()]
+
+
+@given(SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_a_map_arrives_within_half_a_millimetre(random_map: MakeMap, seed: int) -> None:
+    sent = random_map(seed)
+    arrived = complete_map(sent)
+    assert (arrived.robot, arrived.boot, arrived.version) == (sent.robot, sent.boot, sent.version)
+    for before, after in zip(sent.submaps, arrived.submaps, strict=True):
+        assert (before.id, before.component) == (after.id, after.component)
+        assert np.allclose(before.pose, after.pose, atol=HALF_A_MILLIMETRE)
+        assert_same_lines(before.map, after.map)
+        assert_same_trajectory(before.trajectory, after.trajectory)
+
+
+def assert_same_lines(before: LineMap, after: LineMap) -> None:
+    assert np.allclose(before.segments, after.segments, rtol=0, atol=HALF_A_MILLIMETRE)
+    assert np.array_equal(before.polyline, after.polyline)
+    assert np.array_equal(before.support, after.support)
+    assert len(before.free_space) == len(after.free_space)
+    for ring, arrived in zip(before.free_space, after.free_space, strict=True):
+        assert np.allclose(ring, arrived, rtol=0, atol=HALF_A_MILLIMETRE)
+
+
+def assert_same_trajectory(before: Trajectory, after: Trajectory) -> None:
+    assert np.array_equal(before.scan_index, after.scan_index)
+    assert np.allclose(before.stamp, after.stamp, rtol=0, atol=1e-4, equal_nan=True)
+    assert np.allclose(before.pose, after.pose, rtol=0, atol=HALF_A_MILLIMETRE)
+
+
+@given(SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_packing_what_was_unpacked_changes_nothing(random_map: MakeMap, seed: int) -> None:
+    once = complete_map(random_map(seed))
+    assert MapMessage.pack(once) == MapMessage.pack(complete_map(once))
+
+
+@given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=20))
+@settings(deadline=None)
+def test_any_angle_stays_within_half_a_turn_and_keeps_its_bytes(angles: list[float]) -> None:
+    poses = np.column_stack([np.zeros((len(angles), 2)), [*angles[:-1], np.pi]])
+    index = np.arange(len(angles))
+    submap = Submap(
+        0, 0, np.zeros(3), LineMap.empty(), Trajectory(index, np.zeros(len(angles)), poses)
+    )
+    arrived = complete_map(RobotMap("a", "b1", 1, (submap,)))
+    angle = arrived.submaps[0].trajectory.pose[:, 2]
+    assert np.all((angle > -np.pi) & (angle <= np.pi))
+    assert np.all(np.abs(se2.wrap(angle - poses[:, 2])) < 2e-6)
+    assert MapMessage.pack(arrived) == MapMessage.pack(complete_map(arrived))
+
+
+@pytest.mark.parametrize("stamp", [np.nan, np.inf, -np.inf, 1e300])
+def test_a_stamp_that_says_nothing_arrives_as_unknown(stamp: float) -> None:
+    trajectory = Trajectory(np.array([4]), np.array([stamp]), np.zeros((1, 3)))
+    submap = Submap(0, 0, np.zeros(3), LineMap.empty(), trajectory)
+    arrived = complete_map(RobotMap("a", "b1", 1, (submap,)))
+    assert np.isnan(arrived.submaps[0].trajectory.stamp[0])
+
+
+def test_segments_too_short_for_the_wire_vanish_and_take_their_confidence_along() -> None:
+    segments = np.array([[0, 0, 1, 0], [1, 0, 1.0001, 0], [2, 0, 3, 0]], dtype=float)
+    lines = LineMap(segments, np.array([0, 1, 2]), np.array([5, 6, 7]))
+    arrived = PackedLines.pack(lines, 10.0).unpack(10.0)
+    assert arrived.support.tolist() == [5, 7]
+    assert arrived.polyline.tolist() == [0, 1]
+
+
+def test_a_joint_map_arrives_with_its_alignments(random_joint: MakeJoint) -> None:
+    sent = random_joint(5, version=4)
+    arrived = decode(JointMapMessage, encode(JointMapMessage.pack(sent, series="s1"))).unpack()
+    assert arrived.version == 4
+    (before,), (after,) = sent.components, arrived.components
+    assert before.robots.keys() == after.robots.keys()
+    assert np.allclose(before.segment_confidence, after.segment_confidence, atol=1e-3)
+    assert_same_lines(before.map, after.map)
+    assert arrived.alignments[0].runner_up == sent.alignments[0].runner_up
+    assert arrived.alignments[0].evidence == sent.alignments[0].evidence
+
+
+def test_an_alignment_arrives_as_it_was_sent() -> None:
+    (arrived,) = decode(AlignmentMessage, encode(alignments())).unpack()
+    assert np.array_equal(arrived.transform, ALIGNMENT.transform)
+    assert (arrived.reference, arrived.other) == ("a/0", "b/12")
+    assert (arrived.decision, arrived.confidence) == ("refused", 0.125)
+    assert arrived.runner_up == ALIGNMENT.runner_up
+
+
+def test_what_could_not_be_measured_is_left_out() -> None:
+    numbers = {"common": 2.0, "residual": np.inf, "overlap": np.nan}
+    rival = {"transform": [0.0, 0.0, 0.0], **numbers}
+    poor = replace(ALIGNMENT, evidence=numbers, runner_up=rival)
+    versions = [MapVersion(robot=robot, boot="x", version=3) for robot in "ab"]
+    sent = AlignmentMessage.pack("a", versions[0], versions[1], [poor])
+    (arrived,) = decode(AlignmentMessage, encode(sent)).unpack()
+    assert arrived.evidence == {"common": 2.0}
+    assert arrived.runner_up == {"transform": [0.0, 0.0, 0.0], "common": 2.0}
+
+
+def test_a_status_arrives_as_it_was_sent() -> None:
+    assert decode(StatusMessage, encode(status())) == status()
+
+
+def test_a_segment_costs_few_bytes(random_map: MakeMap) -> None:
+    """A list of floats would take 36 bytes of msgpack for each segment alone."""
+    robot_map = random_map(7, 40)
+    numbers = sum(submap.map.segments.size for submap in robot_map.submaps)
+    numbers += sum(ring.size for s in robot_map.submaps for ring in s.map.free_space)
+    numbers += sum(submap.trajectory.pose.size * 5 // 3 for submap in robot_map.submaps)
+    overhead = 250 * len(robot_map.submaps)
+    assert len(encode(MapMessage.pack(robot_map))) < 2.5 * numbers + overhead
+
+
+def accepts_or_refuses(kind: type[Message], payload: bytes) -> None:
+    """Decode `payload`: whatever is not a `MessageError` fails the test."""
+    try:
+        message = decode(kind, payload)
+    except MessageError:
+        return
+    assert isinstance(message, kind)
+
+
+@given(st.binary(max_size=300))
+def test_random_bytes_are_refused(payload: bytes) -> None:
+    for kind in (MapMessage, JointMapMessage, StatusMessage, AlignmentMessage):
+        with pytest.raises(MessageError):
+            decode(kind, payload)
+
+
+@given(st.data())
+@settings(max_examples=300, deadline=None)
+def test_a_damaged_message_is_refused_or_valid(
+    random_map: MakeMap, random_joint: MakeJoint, data: st.DataObject
+) -> None:
+    """Bytes of the envelope, or of the body before compression, are replaced or cut off."""
+    message = data.draw(st.sampled_from(messages(random_map, random_joint)))
+    body = bytearray(msgpack.packb(message.model_dump()))
+    for _ in range(data.draw(st.integers(1, 3))):
+        body[data.draw(st.integers(0, len(body) - 1))] = data.draw(st.integers(0, 255))
+    cut = bytes(body[: data.draw(st.integers(0, len(body)))])
+    for damaged in (bytes(body), cut):
+        accepts_or_refuses(type(message), envelope(message, damaged))
+    payload = encode(message)
+    accepts_or_refuses(type(message), payload[: data.draw(st.integers(0, len(payload)))])
+
+
+HOSTILE = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**64 - 1)
+    | st.floats()
+    | st.text(max_size=9)
+    | st.binary(max_size=40),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=9), inner, max_size=4)
+    ),
+    max_leaves=8,
+)
+
+
+@given(st.data())
+@settings(max_examples=300, deadline=None)
+def test_a_message_with_another_value_in_a_field_is_refused_or_valid(
+    random_map: MakeMap, random_joint: MakeJoint, data: st.DataObject
+) -> None:
+    message = data.draw(st.sampled_from(messages(random_map, random_joint)))
+    fields = message.model_dump()
+    place = fields
+    while True:
+        name = data.draw(st.sampled_from(sorted(place)))
+        inner = place[name][0] if isinstance(place[name], tuple) and place[name] else place[name]
+        if not isinstance(inner, dict) or not inner or data.draw(st.booleans()):
+            break
+        place = inner
+    place[name] = data.draw(HOSTILE)
+    accepts_or_refuses(type(message), envelope(message, msgpack.packb(fields)))
+
+
+def envelope(message: Message, body: bytes) -> bytes:
+    packed: bytes = msgpack.packb({"format": message.format, "deflated": False, "body": body})
+    return packed
+
+
+def test_a_bomb_is_refused_before_it_unfolds() -> None:
+    bomb = zlib.compress(bytes(MAX_BODY + 1))
+    payload = msgpack.packb({"format": MapMessage.format, "deflated": True, "body": bomb})
+    with pytest.raises(MessageError, match="decompressed"):
+        decode(MapMessage, payload)
+
+
+@pytest.mark.parametrize(
+    "start", [b"\xdd\xff\xff\xff\xff", b"\xdf\xff\xff\xff\xff", b"\x91" * 9999]
+)
+def test_a_promise_of_more_than_there_is_is_refused(start: bytes) -> None:
+    with pytest.raises(MessageError):
+        decode(StatusMessage, start)
+    with pytest.raises(MessageError):
+        decode(StatusMessage, envelope(status(), start))
+
+
+def test_another_version_of_a_message_is_named_in_the_refusal() -> None:
+    payload = msgpack.packb({"format": "mapweave/map-message/9", "deflated": False, "body": b""})
+    with pytest.raises(MessageError, match="map-message/9"):
+        decode(MapMessage, payload)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e9])
+def test_coordinates_that_are_nowhere_are_not_sent(random_map: MakeMap, number: float) -> None:
+    robot_map = random_map(1)
+    pose = np.array([number, 0.0, 0.0])
+    lost = Submap(0, 0, pose, LineMap.empty(), Trajectory.empty())
+    with pytest.raises(ValueError, match="expected finite"):
+        MapMessage.pack(RobotMap(robot_map.robot, "b1", 1, (lost,)))
+
+
+def test_an_alignment_of_another_pair_is_refused() -> None:
+    versions = [MapVersion(robot=robot, boot="x", version=3) for robot in "ac"]
+    with pytest.raises(ValueError, match="another pair"):
+        AlignmentMessage.pack("a", versions[0], versions[1], [ALIGNMENT])
+
+
+@pytest.mark.parametrize("transform", [(1e9, 0.0, 0.0), (0.0, -1.1e5, 0.0), (0.0, 0.0, 7.0)])
+def test_an_alignment_to_nowhere_is_refused(transform: tuple[float, float, float]) -> None:
+    fields = alignments().model_dump()
+    fields["alignments"][0]["transform"] = transform
+    with pytest.raises(MessageError, match="transform"):
+        decode(AlignmentMessage, envelope(alignments(), msgpack.packb(fields)))
+
+
+def test_a_reason_that_would_move_the_cursor_is_refused() -> None:
+    fields = alignments().model_dump()
+    fields["alignments"][0]["reason"] = "\x1b[2J"
+    with pytest.raises(MessageError, match="printable"):
+        decode(AlignmentMessage, envelope(alignments(), msgpack.packb(fields)))
