@@ -22,7 +22,6 @@ from benchmarks.truth import (
     relation_error,
     steps_right,
 )
-from mapweave.assembly import assemble
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import write_map
 from mapweave.maps import JointMap, RobotMap, component_name
@@ -156,7 +155,7 @@ def _figures(log: Log, scans: Sequence[Scan], made: Run, merged: JointMap, size:
 def merge(robot_map: RobotMap) -> JointMap:
     """Return `robot_map` as the team would keep it: each component merged into one line map."""
     names = {c: component_name(robot_map.robot, c) for c in robot_map.components}
-    return build_joint_map({names[c]: assemble(robot_map, c) for c in names}, [], version=1)
+    return build_joint_map({names[c]: robot_map.lines(c) for c in names}, [], version=1)
 
 
 def segments_of(merged: JointMap, component: int) -> FloatArray:

@@ -10,7 +10,6 @@ from benchmarks.coverage import metres_in_common, returns_at, wall_cells
 from benchmarks.logs import Log, load_scans, load_truth
 from benchmarks.runs import map_remembered
 from benchmarks.truth import paths, position_error, true_frame
-from mapweave.assembly import assemble
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import RobotMap, component_name
@@ -90,7 +89,7 @@ def _parts(robot_map: RobotMap, truth: FloatArray) -> dict[str, Part]:
     parts = {}
     for path in paths(robot_map):
         frame = true_frame(path, truth)
-        ends = assemble(robot_map, path.component).segments.reshape(-1, 2)
+        ends = robot_map.lines(path.component).segments.reshape(-1, 2)
         name = component_name(robot_map.robot, path.component)
         parts[name] = Part(frame, position_error(path, truth), ends)
     return parts

@@ -12,12 +12,11 @@ from benchmarks.logs import find_logs
 from benchmarks.pairs import compare
 from benchmarks.stretches import Stretch, map_stretches
 from benchmarks.tables import format_table
-from mapweave.assembly import lines_of, submaps_by_component
 from mapweave.commands.progress import track
 from mapweave.fusion.confidence import percent
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.maps import Alignment, Submap
+from mapweave.maps import Alignment, Submap, lines_of, submaps_by_component
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.team.alignment_graph import (
     SET_ASIDE,

@@ -4,12 +4,13 @@ Words and formats: a *segment* is directed, its visible side on the left of its 
 *submap* has a frame of its own; a *component* is a set of submaps whose relative pose is known.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
+from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 
 Decision = Literal["accepted", "ambiguous", "refused"]
@@ -78,6 +79,29 @@ class LineMap:
         """Return a map of nothing."""
         return cls(np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
 
+    @classmethod
+    def union(cls, line_maps: "Sequence[LineMap]") -> "LineMap":
+        """Return all lines and free space of `line_maps`, which share a frame, side by side."""
+        if not line_maps:
+            return cls.empty()
+        counts = [int(m.polyline[-1]) + 1 if len(m.polyline) else 0 for m in line_maps]
+        offsets = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        return cls(
+            np.concatenate([m.segments for m in line_maps]),
+            np.concatenate([m.polyline + k for m, k in zip(line_maps, offsets, strict=True)]),
+            np.concatenate([m.support for m in line_maps]),
+            tuple(ring for m in line_maps for ring in m.free_space),
+        )
+
+    def moved(self, pose: FloatArray) -> "LineMap":
+        """Return this map, given in the frame at `pose` (3,), in that frame's parent."""
+        return LineMap(
+            se2.transform_segments(pose, self.segments),
+            self.polyline,
+            self.support,
+            tuple(se2.transform_points(pose, ring) for ring in self.free_space),
+        )
+
     @property
     def polylines(self) -> list[FloatArray]:
         """The (k, 4) segments of each generalized polyline."""
@@ -135,6 +159,10 @@ class RobotMap:
     def components(self) -> list[int]:
         """The component numbers in use, ascending."""
         return sorted({submap.component for submap in self.submaps})
+
+    def lines(self, component: int) -> LineMap:
+        """Return all submaps of `component` in its frame, not merged."""
+        return lines_of(s for s in self.submaps if s.component == component)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,3 +231,17 @@ class JointMap:
 def component_name(robot: str, component: int) -> str:
     """Return the name of a robot's component, such as ``a/0``."""
     return f"{robot}/{component}"
+
+
+def lines_of(submaps: Iterable[Submap]) -> LineMap:
+    """Return the lines of `submaps` of one component in its frame, not merged."""
+    return LineMap.union([s.map.moved(s.pose) for s in submaps])
+
+
+def submaps_by_component(maps: Iterable[RobotMap]) -> dict[str, list[Submap]]:
+    """Return the submaps of every component of `maps`, by its name."""
+    return {
+        component_name(m.robot, c): [s for s in m.submaps if s.component == c]
+        for m in maps
+        for c in m.components
+    }

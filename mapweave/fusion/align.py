@@ -12,7 +12,6 @@ from functools import cached_property
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.assembly import assemble
 from mapweave.fusion.confidence import ConfidenceParameters, confidence, percent
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, numbers, runner_up
 from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
@@ -61,7 +60,7 @@ class _Component:
     def __init__(self, robot_map: RobotMap, number: int, p: FusionParameters) -> None:
         self._robot_map, self._number, self._p = robot_map, number, p
         self.name = component_name(robot_map.robot, number)
-        self.whole = prepare(assemble(robot_map, number), p)
+        self.whole = prepare(robot_map.lines(number), p)
 
     @cached_property
     def parts(self) -> list[PreparedMap]:

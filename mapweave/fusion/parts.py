@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.assembly import place, unite_lines
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap, RobotMap
@@ -37,7 +36,9 @@ def cut(robot_map: RobotMap, component: int, parameters: PartParameters) -> list
     length = max(p.length, float(path.sum()) / p.count)
     part = ((np.cumsum(path) - path / 2) / length).astype(np.int64)
     return [
-        unite_lines([place(s.map, s.pose) for s, k in zip(submaps, part, strict=True) if k == name])
+        LineMap.union(
+            [s.map.moved(s.pose) for s, k in zip(submaps, part, strict=True) if k == name]
+        )
         for name in np.unique(part)
     ]
 

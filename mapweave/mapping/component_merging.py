@@ -13,13 +13,12 @@ from itertools import groupby, pairwise
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.assembly import lines_of
 from mapweave.fusion.align import FusionParameters, compare, prepare
 from mapweave.fusion.decision import DecisionParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.place_recognition import PlaceRecognitionParameters, PlaceRecognizer
-from mapweave.maps import Alignment, Submap
+from mapweave.maps import Alignment, Submap, lines_of
 from mapweave.matching.hypotheses import PreparedMap
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.assembly import place, unite_lines
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
@@ -138,14 +137,14 @@ class Mapper:
 
     def _known(self) -> LineMap:
         """G_(t-1): the lines around the robot, tracker's frame."""
-        growing = [] if self._growing.is_empty else [place(self._growing.lines(), self._frame)]
+        growing = [] if self._growing.is_empty else [self._growing.lines().moved(self._frame)]
         to_tracker = se2.inverse(self._origin)
         last = [
-            place(s.map, se2.compose(to_tracker, s.pose))
+            s.map.moved(se2.compose(to_tracker, s.pose))
             for s in self._finished[-1:]
             if s.component == self._component
         ]
-        return unite_lines(last + growing)
+        return LineMap.union(last + growing)
 
     def _start_again(self) -> None:
         """Begin a new component with the scans that wait; they fit each other or wait on."""

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.assembly import lines_of
 from mapweave.fusion.align import FusionParameters, compare, prepare
 from mapweave.fusion.parts import PartParameters, difference
 from mapweave.geometry.arrays import FloatArray
-from mapweave.maps import Submap
+from mapweave.maps import Submap, lines_of
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.matching.verification import verify

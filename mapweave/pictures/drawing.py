@@ -15,7 +15,6 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 
-from mapweave.assembly import place
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.pictures.layout import PlacedScene
@@ -101,7 +100,7 @@ def _draw_floor(
 
 
 def _draw_walls(axes: Axes, placed: PlacedScene, strong: int) -> None:
-    lines = place(placed.scene.map, placed.pose)
+    lines = placed.scene.map.moved(placed.pose)
     strength = _strength(placed.scene, strong)
     order = np.argsort(strength, kind="stable")  # the well-seen on top
     walls = LineCollection(

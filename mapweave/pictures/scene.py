@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from mapweave.assembly import assemble
 from mapweave.fusion.confidence import percent
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
@@ -109,7 +108,7 @@ def _place_polygons(pose: FloatArray, polygons: Iterable[FloatArray]) -> tuple[F
 def _robot_scene(robot_map: RobotMap, component: int) -> Scene:
     name = component_name(robot_map.robot, component)
     submaps = [submap for submap in robot_map.submaps if submap.component == component]
-    lines = assemble(robot_map, component)
+    lines = robot_map.lines(component)
     paths = tuple(_path(robot_map.robot, name, run) for run in _runs(submaps))
     return Scene(
         name,

@@ -12,17 +12,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from mapweave.fusion.extrapolation import ExtrapolationParameters, bend
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.team.min_cut import groups
-from mapweave.team.cycles import Edge, misfit, poses_along
-from mapweave.team.contradictions import ContradictionParameters, MapContradictions, PairVerdicts, PairVerdict
-from mapweave.team.consistency import ConsistencyParameters, bits, explain
-from mapweave.matching.distance_field import DistanceField
-from mapweave.maps import Alignment
 from mapweave.mapping.pose_graph import Constraint, optimise
-from mapweave.fusion.extrapolation import ExtrapolationParameters, bend
+from mapweave.maps import Alignment
+from mapweave.matching.distance_field import DistanceField
+from mapweave.team.consistency import ConsistencyParameters, bits, explain
+from mapweave.team.contradictions import (
+    ContradictionParameters,
+    MapContradictions,
+    PairVerdict,
+    PairVerdicts,
+)
+from mapweave.team.cycles import Edge, misfit, poses_along
 from mapweave.team.inliers import component_confidence, part_right, rely, weakest_link
+from mapweave.team.min_cut import groups
 
 SET_ASIDE = "set aside: "  # begins the reason of an accepted alignment that is not relied on
 REASON_LENGTH = 500  # characters, as many as a message carries

@@ -126,7 +126,11 @@ class _Search:
     """Sets of removed edges as bit masks, in the order of what they cost."""
 
     def __init__(
-        self, count: int, edges: Sequence[Edge], p: ConsistencyParameters, contradictions: Contradictions
+        self,
+        count: int,
+        edges: Sequence[Edge],
+        p: ConsistencyParameters,
+        contradictions: Contradictions,
     ) -> None:
         self._count, self._edges, self._p, self._doubts = count, edges, p, contradictions
         self._odds = [p.log_odds(edge.confidence) for edge in edges]

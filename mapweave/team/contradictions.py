@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.team.min_cut import groups
-from mapweave.team.cycles import Edge, poses_along
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import Verdict, VerificationParameters, verify
+from mapweave.team.cycles import Edge, poses_along
+from mapweave.team.min_cut import groups
 
 
 class ContradictionParameters(BaseModel):
@@ -75,7 +75,10 @@ class PairVerdicts:
     """
 
     def __init__(
-        self, rasters: Mapping[int, DistanceField], frames: FloatArray, parameters: ContradictionParameters
+        self,
+        rasters: Mapping[int, DistanceField],
+        frames: FloatArray,
+        parameters: ContradictionParameters,
     ) -> None:
         self._rasters, self._frames, self._p = rasters, frames, parameters
         self._known: dict[tuple[int, ...], PairVerdict | None] = {}
@@ -100,7 +103,9 @@ class PairVerdicts:
         verdict = verify(self._rasters[first], self._rasters[second], pose, p.verification)
         allowed = p.allowance * (max(verdict.common, 0.0) + verdict.contradicted)
         excess = verdict.contradicted - allowed
-        return PairVerdict(first, second, verdict, excess / p.metres_per_log) if excess > 0 else None
+        return (
+            PairVerdict(first, second, verdict, excess / p.metres_per_log) if excess > 0 else None
+        )
 
 
 class MapContradictions:

@@ -8,8 +8,8 @@ robots have met, the place is proof enough, and the join has the confidence that
 from collections.abc import Sequence
 from dataclasses import replace
 
-from mapweave.team.alignment_graph import shortened
 from mapweave.maps import Alignment
+from mapweave.team.alignment_graph import shortened
 
 KEPT = "the robots met before; "  # begins the reason of a join that is kept
 

@@ -3,15 +3,17 @@
 import math
 from collections.abc import Iterable, Sequence
 
-from mapweave.team.min_cut import groups, weakest_cut_of_all
+from mapweave.team.consistency import ConsistencyParameters, ConsistentSet
 from mapweave.team.cycles import Edge
-from mapweave.team.consistency import ConsistentSet, ConsistencyParameters
+from mapweave.team.min_cut import groups, weakest_cut_of_all
 
 CERTAIN = 1e-6  # least doubt in an alignment that is counted
 MAX_UNDECIDED = 0.5 + 1e-6  # an even chance, rounding included, decides nothing
 
 
-def rely(count: int, edges: Sequence[Edge], explanations: Sequence[ConsistentSet]) -> frozenset[int]:
+def rely(
+    count: int, edges: Sequence[Edge], explanations: Sequence[ConsistentSet]
+) -> frozenset[int]:
     """Return the edges of the most probable explanation, less those that nothing decides about.
 
     A group of nodes that holds together rightly in half of what may be, or less, loses the edge

@@ -7,23 +7,24 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from shapely.geometry.base import BaseGeometry
 
-from mapweave.team.alignment_graph import Cluster, AlignmentGraphParameters, cluster_components
 from mapweave.geometry.arrays import FloatArray
-from mapweave.assembly import lines_of, place, submaps_by_component, unite_lines
-from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, unite
-from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.lines.merging import MergingParameters, evolve
+from mapweave.lines.polylines import group_polylines
+from mapweave.lines.simplification import SimplificationParameters, simplify, sources
 from mapweave.maps import (
     Alignment,
     JointComponent,
     JointMap,
     LineMap,
     RobotMap,
+    lines_of,
+    submaps_by_component,
 )
-from mapweave.lines.merging import MergingParameters, evolve
-from mapweave.lines.polylines import group_polylines
-from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
-from mapweave.lines.simplification import SimplificationParameters, simplify, sources
+from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, unite
+from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster, cluster_components
 from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
 
 Weave: TypeAlias = Callable[[Cluster, Sequence[Alignment]], tuple[Cluster, Mapping[str, LineMap]]]
 
@@ -107,8 +108,8 @@ def _join(
     rasters: Mapping[str, DistanceField],
     p: JointParameters,
 ) -> JointComponent:
-    placed = [place(components[name], pose) for name, pose in cluster.poses.items()]
-    everything = unite_lines(placed)
+    placed = [components[name].moved(pose) for name, pose in cluster.poses.items()]
+    everything = LineMap.union(placed)
     free = unite([from_rings(everything.free_space)], p.free_space)
     walls = _merged(everything, free, p)
     wall, source = sources(walls, everything.segments)

@@ -16,13 +16,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
-from mapweave.team.alignment_graph import Cluster
 from mapweave.geometry.arrays import FloatArray
-from mapweave.assembly import lines_of, place, unite_lines
 from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle
-from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.mapping.submap_graph import joining_covariance, tracking_covariance
+from mapweave.maps import Alignment, LineMap, Submap, Trajectory, lines_of
+from mapweave.team.alignment_graph import Cluster
 
 
 class JointOptimizationParameters(BaseModel):
@@ -235,7 +234,7 @@ def _rooted(
         poses[name] = se2.fit(before, fitted[inside])
         own = se2.between(poses[name], fitted[inside])
         maps = [nodes[k].submap.map for k in inside]
-        lines[name] = unite_lines([place(m, pose) for m, pose in zip(maps, own, strict=True)])
+        lines[name] = LineMap.union([m.moved(pose) for m, pose in zip(maps, own, strict=True)])
     first, root = next(iter(poses.items()))
     rooted = {name: se2.between(root, pose) for name, pose in poses.items()}
     rooted[first] = np.zeros(3)

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from mapweave.team.alignment_graph import SET_ASIDE, shortened
 from mapweave.maps import Alignment, JointMap
+from mapweave.team.alignment_graph import SET_ASIDE, shortened
 
 _MARK = re.compile(r"revoked in version ([0-9]{1,16}): ")
 

@@ -7,8 +7,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
-from mapweave.matching.distance_field import DistanceField
 from mapweave.maps import LineMap
+from mapweave.matching.distance_field import DistanceField
 from mapweave.scan.points import OrientedPoints, points_on_lines
 
 
@@ -52,7 +52,10 @@ def segment_confidence(
 
 
 def _vote(
-    raster: DistanceField, pose: FloatArray, oriented: OrientedPoints, p: SegmentConfidenceParameters
+    raster: DistanceField,
+    pose: FloatArray,
+    oriented: OrientedPoints,
+    p: SegmentConfidenceParameters,
 ) -> tuple[BoolArray, BoolArray]:
     """(n,) masks: where the map has a wall itself, and where it saw through instead."""
     own = se2.transform_points(se2.inverse(pose), oriented.points)

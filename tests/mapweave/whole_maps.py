@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.random import Generator
 
-from mapweave.assembly import assemble, place, unite_lines
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import (
@@ -50,7 +49,7 @@ def _submap(
     stamps = np.where(index == 3, np.nan, 0.1 * index)
     trajectory = Trajectory(index, stamps, se2.compose(into, path))
     pose = se2.compose(se2.inverse(home), frame)
-    return Submap(number, component, pose, place(known, into), trajectory)
+    return Submap(number, component, pose, known.moved(into), trajectory)
 
 
 def joint_map(
@@ -58,7 +57,7 @@ def joint_map(
 ) -> JointMap:
     """Return the joint map of one component in which component 0 of each of `maps` has its pose."""
     robots = {component_name(m.robot, 0): pose for m, pose in zip(maps, poses, strict=True)}
-    lines = unite_lines([place(assemble(m, 0), p) for m, p in zip(maps, poses, strict=True)])
+    lines = LineMap.union([m.lines(0).moved(p) for m, p in zip(maps, poses, strict=True)])
     certain = np.linspace(0.0, 1.0, len(lines.segments))
     return JointMap(4, (JointComponent(robots, confidence, lines, certain),), ())
 

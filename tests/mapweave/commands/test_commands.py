@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.assembly import place
 from mapweave.cli import main
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -224,7 +223,7 @@ def test_an_output_that_cannot_be_written_fails_in_one_line(log: Path, tmp_path:
 def robot_map(robot: str, lines: LineMap, seed: int) -> RobotMap:
     """Return the noisy map of a robot that started somewhere."""
     rng = np.random.default_rng(seed)
-    seen = place(shaken(lines, rng), random_pose(rng))
+    seen = shaken(lines, rng).moved(random_pose(rng))
     trajectory = Trajectory(np.array([0]), np.array([np.nan]), np.zeros((1, 3)))
     return RobotMap(robot, "0", 1, (Submap(0, 0, np.zeros(3), seen, trajectory),))
 

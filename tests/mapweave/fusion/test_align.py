@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.assembly import place
 from mapweave.fusion.align import FusionParameters, align_maps, align_robots
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide
 from mapweave.geometry import se2
@@ -46,7 +45,7 @@ def compared(
     rng = np.random.default_rng(seed)
     a, b = random_pose(rng), random_pose(rng)
     found = align_maps(
-        ("a/0", place(shaken(reference, rng), a)), ("b/0", place(shaken(other, rng), b)), parameters
+        ("a/0", shaken(reference, rng).moved(a)), ("b/0", shaken(other, rng).moved(b)), parameters
     )
     return found, se2.compose(se2.inverse(a), se2.compose(found.transform, b))
 
@@ -176,7 +175,7 @@ def test_moving_a_map_composes_with_the_transform(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = random_pose(rng), random_pose(rng)
     here = align_maps(("a/0", LEFT), ("b/0", RIGHT)).transform
-    there = align_maps(("a/0", place(LEFT, a)), ("b/0", place(RIGHT, b))).transform
+    there = align_maps(("a/0", LEFT.moved(a)), ("b/0", RIGHT.moved(b))).transform
     assert_right(se2.compose(se2.inverse(a), se2.compose(there, b)), here)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.assembly import place
 from mapweave.fusion.align import FusionParameters, align_maps, align_robots, prepare
 from mapweave.fusion.extrapolation import ExtrapolationParameters, bend, holds, reach
 from mapweave.geometry import se2
@@ -54,7 +53,7 @@ def test_what_both_maps_go_on_for_adds_up_in_squares() -> None:
 def test_the_reach_depends_on_no_frame(rng: Generator) -> None:
     a, b = random_pose(rng), random_pose(rng)
     one, other = part(HALL, 0, 40), part(HALL, 25, 90)
-    moved = between(place(one, a), place(other, b), se2.compose(a, se2.inverse(b)))
+    moved = between(one.moved(a), other.moved(b), se2.compose(a, se2.inverse(b)))
     assert moved == pytest.approx(between(one, other), abs=0.5)
 
 

@@ -9,7 +9,6 @@ import pytest
 import shapely
 from numpy.random import Generator
 
-from mapweave.assembly import assemble
 from mapweave.cli import main
 from mapweave.errors import FileError
 from mapweave.io.export import EXPORT_SUFFIXES, PLANNED_SUFFIXES, export
@@ -60,7 +59,7 @@ def test_geojson_holds_every_wall_in_its_polyline_with_its_support(
     known = robot_map(rng, components=(0, 0, 1))
     content = exported(known, tmp_path)
     for component in known.components:
-        expected = assemble(known, component)
+        expected = known.lines(component)
         found = line_map_of(of_kind(content, "polyline", f"a/{component}"))
         np.testing.assert_allclose(found.segments, expected.segments, rtol=0, atol=TOLERANCE)
         np.testing.assert_array_equal(found.polyline, expected.polyline)
@@ -72,7 +71,7 @@ def test_geojson_holds_the_free_space_as_closed_counter_clockwise_rings(
 ) -> None:
     """RFC 7946, 3.1.6; the map's own rings may run either way."""
     known = robot_map(rng)
-    expected = assemble(known, 0).free_space
+    expected = known.lines(0).free_space
     found = of_kind(exported(known, tmp_path), "free_space")
     assert len(found) == len(expected)
     for feature, ring in zip(found, expected, strict=True):

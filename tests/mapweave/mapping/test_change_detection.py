@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.assembly import assemble
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.change_detection import (
@@ -61,7 +60,7 @@ def test_a_person_who_crosses_the_room_leaves_no_trace_in_a_robots_map(rng: Gene
         person = PERSON + step + [1.5, 1.0, 1.5, 1.0] if k <= 10 else np.empty((0, 4))
         scan = cast(np.vstack([ROOM, person]), pose, index=k, angles=AROUND, noise=rng)
         assert mapper.add(scan).placed
-    walls = se2.transform_segments(poses[0], assemble(mapper.finish(), 0).segments)
+    walls = se2.transform_segments(poses[0], mapper.finish().lines(0).segments)
     inside = (walls > 0.3).all(axis=1) & (walls < [7.7, 4.7, 7.7, 4.7]).all(axis=1)
     assert len(walls) >= 4
     assert not inside.any()

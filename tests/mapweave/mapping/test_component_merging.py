@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.assembly import place
 from mapweave.fusion.align import FusionParameters
 from mapweave.fusion.decision import Hypothesis, decide
 from mapweave.geometry import se2
@@ -23,7 +22,7 @@ from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, corridor, part, r
 
 def submap(number: int, component: int, pose: FloatArray, lines: LineMap) -> Submap:
     """Return a submap of `lines`, given in the building's frame, with a frame at `pose` in it."""
-    own = place(lines, se2.inverse(pose))
+    own = lines.moved(se2.inverse(pose))
     return Submap(number, component, pose, own, Trajectory.empty())
 
 

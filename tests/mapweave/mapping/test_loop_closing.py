@@ -7,7 +7,6 @@ import pytest
 import shapely
 from numpy.random import Generator
 
-from mapweave.assembly import place
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.loop_closing import LoopCloser, LoopParameters
@@ -79,7 +78,7 @@ def submap_along(number: int, path: FloatArray, lines: LineMap) -> Submap:
     local = se2.between(path[0], path)
     index = 100 * number + np.arange(len(path))
     trajectory = Trajectory(index, np.full(len(path), np.nan), local)
-    return Submap(number, 0, path[0], place(lines, se2.inverse(path[0])), trajectory)
+    return Submap(number, 0, path[0], lines.moved(se2.inverse(path[0])), trajectory)
 
 
 def round_the_ring(count: int, rng: Generator) -> list[Submap]:
@@ -199,7 +198,7 @@ def visits(*rooms: tuple[LineMap, float, float]) -> list[Submap]:
     for number, (lines, x, y) in enumerate(rooms):
         at = np.array([x, y, 0.0])
         path = se2.compose(at, THERE_AND_BACK)
-        submaps.append(submap_along(number, path, place(lines, at)))
+        submaps.append(submap_along(number, path, lines.moved(at)))
     return submaps
 
 

@@ -8,7 +8,6 @@ import pytest
 import shapely
 from numpy.random import Generator
 
-from mapweave.assembly import assemble
 from mapweave.errors import InvalidIdError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -89,7 +88,7 @@ def off_the_walls(
     robot_map: RobotMap, component: int, origin: FloatArray, walls: FloatArray
 ) -> FloatArray:
     """(n,) how far [m] samples of the map's wall are from `walls`, mapped from `origin` (3,)."""
-    segments = se2.transform_segments(origin, assemble(robot_map, component).segments)
+    segments = se2.transform_segments(origin, robot_map.lines(component).segments)
     shares = np.linspace(0, 1, 5)[:, None, None]
     samples = (segments[:, :2] + shares * (segments[:, 2:] - segments[:, :2])).reshape(-1, 2)
     lines = shapely.multilinestrings(shapely.linestrings(walls.reshape(-1, 2, 2)))
@@ -115,7 +114,7 @@ def test_what_was_mapped_are_the_walls_of_the_building(followed: Run) -> None:
 
 def test_lines_are_few_however_many_scans_saw_them(followed: Run) -> None:
     """Hundreds of sightings, tens of segments, most of them seen again and again."""
-    lines = assemble(followed.map, 0)
+    lines = followed.map.lines(0)
     assert len(lines.segments) < 3 * len(BUILDING)
     assert np.median(lines.support) > 5
 

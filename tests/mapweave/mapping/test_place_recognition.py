@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapweave.assembly import place, unite_lines
 from mapweave.fusion.align import FusionParameters, compare, prepare
 from mapweave.geometry import se2
 from mapweave.mapping.component_merging import ComponentMerger, ComponentMergingParameters
@@ -31,7 +30,7 @@ def component(number: int, first: int, bend: float) -> list[Submap]:
     """Return the long corridor in five submaps, each turned by `bend` [rad] more than it is."""
     pose, submaps = np.array([3.0, -7.0, 0.4 * number]), []
     for k in range(5):
-        own = place(part(LONG, 12 * k, 12 * k + 12), se2.inverse(np.array([12.0 * k, 0, 0])))
+        own = part(LONG, 12 * k, 12 * k + 12).moved(se2.inverse(np.array([12.0 * k, 0, 0])))
         path = Trajectory(np.arange(2), np.zeros(2), np.array([[0.0, 1, 0], [12.0, 1, 0]]))
         submaps.append(Submap(first + k, number, pose, own, path))
         pose = se2.compose(pose, np.array([12.0, 0, bend]))
@@ -42,7 +41,7 @@ OLDER, YOUNGER = component(0, 0, 0.02), component(1, 5, -0.02)
 
 
 def lines_of(submaps: list[Submap], number: int) -> LineMap:
-    return unite_lines([place(s.map, s.pose) for s in submaps if s.component == number])
+    return LineMap.union([s.map.moved(s.pose) for s in submaps if s.component == number])
 
 
 def look(place_recognition: PlaceRecognizer, submaps: list[Submap]) -> RecognizedPlace | None:

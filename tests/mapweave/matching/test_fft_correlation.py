@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mapweave.assembly import place
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
@@ -31,7 +30,7 @@ def shifts(reference: LineMap, other: LineMap, turn: float, count: int) -> Float
 def test_the_true_shift_of_two_halves_of_a_building_is_among_the_best(seed: int) -> None:
     rng = np.random.default_rng(seed)
     true = random_pose(rng, 40)
-    other = place(part(BUILDING, 10, 30), se2.inverse(true))
+    other = part(BUILDING, 10, 30).moved(se2.inverse(true))
     found = shifts(part(BUILDING, 0, 17), other, true[2], 5)
     assert np.hypot(*(found - true[:2]).T).min() < P.cell
 
@@ -41,7 +40,7 @@ def test_shifts_are_right_where_maps_hardly_overlap() -> None:
     corner = line_map(np.array([[0.0, 0, 6, 0], [6, 0, 6, 6]]))
     for shift in ([-40.0, 30.0, 0], [40.0, -30.0, 0]):
         far = line_map(np.array([[-40.0, 30, -39, 30], [40.0, -30, 41, -30]]))
-        both = line_map(np.vstack([far.segments, place(corner, np.array(shift)).segments]))
+        both = line_map(np.vstack([far.segments, corner.moved(np.array(shift)).segments]))
         found = shifts(both, corner, 0.0, 1)
         assert np.hypot(*(found[0] - shift[:2])) < P.cell
 

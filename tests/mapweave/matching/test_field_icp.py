@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mapweave.assembly import place
 from mapweave.geometry import se2
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
@@ -22,7 +21,7 @@ def raster(lines: LineMap) -> DistanceField:
 def test_starts_near_the_truth_end_there(seed: int) -> None:
     rng = np.random.default_rng(seed)
     true = random_pose(rng)
-    other = place(part(BUILDING, 8, 30), se2.inverse(true))
+    other = part(BUILDING, 8, 30).moved(se2.inverse(true))
     off = rng.uniform([-0.3, -0.3, -0.03], [0.3, 0.3, 0.03], (40, 3))
     about = np.array([*MIDDLE, 0.0])
     starts = se2.compose(se2.compose(about, off), se2.compose(se2.inverse(about), true))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.assembly import place
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
@@ -83,7 +82,7 @@ def test_parallel_walls_hold_only_across() -> None:
 def test_the_verdict_depends_on_no_frame(rng: Generator) -> None:
     here = judged(LEFT, RIGHT)
     a, b = random_pose(rng), random_pose(rng)
-    there = judged(place(LEFT, a), place(RIGHT, b), se2.between(se2.inverse(a), se2.inverse(b)))
+    there = judged(LEFT.moved(a), RIGHT.moved(b), se2.between(se2.inverse(a), se2.inverse(b)))
     assert there.common == pytest.approx(here.common, rel=0.03)
     assert there.contradicted == pytest.approx(here.contradicted, abs=0.5)
     assert there.held == pytest.approx(here.held, rel=0.06)

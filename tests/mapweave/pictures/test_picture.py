@@ -12,7 +12,6 @@ import pytest
 import shapely
 from numpy.random import Generator
 
-from mapweave.assembly import assemble
 from mapweave.errors import FileError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -72,7 +71,7 @@ def test_the_picture_has_each_wall_once_to_the_scale_of_its_bar(
     draw_map(known, tmp_path / "map.svg")
     picture = svg(tmp_path / "map.svg")
     drawn = np.array([points.reshape(4) for points, _ in lines_of(picture, "walls-a/0")])
-    expected = assemble(known, 0).segments
+    expected = known.lines(0).segments
     assert len(drawn) == len(expected)
     np.testing.assert_allclose(
         np.sort(lengths(drawn)) / scale_of(picture), np.sort(lengths(expected)), atol=0.01
@@ -100,7 +99,7 @@ def test_the_floor_is_what_was_seen_to_be_free(rng: Generator, tmp_path: Path) -
     draw_map(known, tmp_path / "map.svg")
     picture = svg(tmp_path / "map.svg")
     ((outline, _),) = lines_of(picture, "floor-a/0")
-    expected = from_rings(assemble(known, 0).free_space).area
+    expected = from_rings(known.lines(0).free_space).area
     area = shapely.Polygon(outline).area / scale_of(picture) ** 2
     assert area == pytest.approx(expected, rel=0.02)
 

@@ -9,11 +9,10 @@ import pytest
 from numpy.random import Generator
 
 from mapweave.geometry import se2
-from mapweave.team.alignment_graph import Cluster, AlignmentGraphParameters, cluster_components
 from mapweave.geometry.arrays import FloatArray
-from mapweave.assembly import place
-from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.maps import Alignment, Decision, LineMap
+from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster, cluster_components
 from tests.mapweave.buildings import BUILDING, part, random_pose
 
 P = AlignmentGraphParameters()
@@ -233,7 +232,9 @@ def test_one_wrong_alignment_the_surest_of_all_is_set_aside_and_named(seed: int)
 
 
 def rasters_of(maps: Mapping[str, LineMap]) -> dict[str, DistanceField]:
-    return {name: DistanceField.of(lines, DistanceFieldParameters()) for name, lines in maps.items()}
+    return {
+        name: DistanceField.of(lines, DistanceFieldParameters()) for name, lines in maps.items()
+    }
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -243,7 +244,7 @@ def test_other_frames_change_nothing(seed: int) -> None:
     team = random_team(rng)
     links = [team.wrong, *team.links]
     frames = {name: random_pose(rng) for name in team.names}
-    maps = {name: place(part(BUILDING, 0, 9), random_pose(rng, 3)) for name in team.names}
+    maps = {name: part(BUILDING, 0, 9).moved(random_pose(rng, 3)) for name in team.names}
     maps = {name: replace(lines, free_space=()) for name, lines in maps.items()}
     moved = [
         replace(
@@ -254,7 +255,7 @@ def test_other_frames_change_nothing(seed: int) -> None:
         )
         for a in links
     ]
-    maps_moved = {name: place(maps[name], frames[name]) for name in team.names}
+    maps_moved = {name: maps[name].moved(frames[name]) for name in team.names}
     (here,), judged = cluster_components(team.names, links, P, rasters_of(maps))
     (there,), judged_there = cluster_components(team.names, moved, P, rasters_of(maps_moved))
     assert [a.reason for a in judged] == [a.reason for a in judged_there]

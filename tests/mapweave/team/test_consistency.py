@@ -10,10 +10,10 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.team.min_cut import groups
-from mapweave.team.cycles import CycleParameters, Edge, bad_cycles
 from mapweave.team.consistency import ConsistencyParameters, explain
+from mapweave.team.cycles import CycleParameters, Edge, bad_cycles
 from mapweave.team.inliers import component_confidence, rely
+from mapweave.team.min_cut import groups
 from tests.mapweave.buildings import random_pose
 
 P = ConsistencyParameters()

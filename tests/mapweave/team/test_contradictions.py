@@ -8,9 +8,8 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.assembly import place, unite_lines
+from mapweave.maps import Alignment, JointMap, LineMap
 from mapweave.team.joint_map import build_joint_map
-from mapweave.maps import Alignment, JointMap
 from tests.mapweave.buildings import BUILDING, line_map, part, random_pose, shaken
 
 LEFT, RIGHT = part(BUILDING, 0, 16), part(BUILDING, 14, 30)
@@ -58,7 +57,7 @@ def test_two_links_as_sure_as_each_other_are_both_parted() -> None:
 def test_a_little_contradiction_makes_less_sure_and_parts_nothing() -> None:
     """One wall of 6 m too many: 2.3 m beyond the allowance, which is less than two sure links."""
     ghost = np.array([[4.0, 0.9, 10.0, 0.9]])
-    haunted = unite_lines([WALLS, line_map(ghost)])
+    haunted = LineMap.union([WALLS, line_map(ghost)])
     alignments = [link("a/0", "b/0", STILL, 0.95), link("b/0", "c/0", STILL, 0.95)]
     joint = build_joint_map({"a/0": LEFT, "b/0": MIDDLE, "c/0": haunted}, alignments, 1)
     assert len(joint.components) == 1
@@ -83,7 +82,7 @@ def test_what_maps_saw_decides_a_cycle_that_nothing_else_decides(confidence: flo
 def test_doubts_depend_on_no_frame(rng: Generator) -> None:
     frames = [random_pose(rng) for _ in range(3)]
     a, b, c = (
-        place(shaken(lines, rng), frame)
+        shaken(lines, rng).moved(frame)
         for lines, frame in zip((LEFT, MIDDLE, WALLS), frames, strict=True)
     )
     seen_from = [se2.inverse(frame) for frame in frames]

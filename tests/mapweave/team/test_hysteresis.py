@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mapweave.team.hysteresis import joins, keep_joined
 from mapweave.maps import Alignment, Decision
+from mapweave.team.hysteresis import joins, keep_joined
 
 PLACE = {"place": 0.97, "reach": 40.0}
 

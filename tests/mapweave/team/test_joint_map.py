@@ -8,10 +8,9 @@ from shapely.geometry import Polygon
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.assembly import place
+from mapweave.maps import Alignment, LineMap
 from mapweave.scan.free_space import from_rings
 from mapweave.team.joint_map import build_joint_map
-from mapweave.maps import Alignment, LineMap
 from tests.mapweave.buildings import (
     BUILDING,
     line_map,
@@ -65,7 +64,7 @@ def test_two_sightings_of_a_building_become_one_and_their_support_adds(rng: Gene
 
 def test_two_halves_make_the_whole(rng: Generator) -> None:
     true = random_pose(rng)
-    other = place(shaken(RIGHT, rng, 0.01), se2.inverse(true))
+    other = shaken(RIGHT, rng, 0.01).moved(se2.inverse(true))
     alignments = [link("a/0", "b/0", true)]
     (component,) = build_joint_map({"a/0": LEFT, "b/0": other}, alignments, 1).components
     np.testing.assert_allclose(component.robots["b/0"], true)
@@ -80,7 +79,7 @@ def test_two_halves_make_the_whole(rng: Generator) -> None:
 def test_the_shape_does_not_depend_on_the_robots_frames(rng: Generator) -> None:
     here = build_joint_map({"a/0": LEFT, "b/0": RIGHT}, [link("a/0", "b/0", np.zeros(3))], 1)
     a, b = random_pose(rng), random_pose(rng)
-    moved = {"a/0": place(LEFT, a), "b/0": place(RIGHT, b)}
+    moved = {"a/0": LEFT.moved(a), "b/0": RIGHT.moved(b)}
     there = build_joint_map(moved, [link("a/0", "b/0", se2.compose(a, se2.inverse(b)))], 1)
     (one,), (other,) = here.components, there.components
     back = se2.transform_segments(se2.inverse(a), other.map.segments)

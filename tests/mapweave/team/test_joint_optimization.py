@@ -7,13 +7,12 @@ import pytest
 from numpy.random import Generator
 
 from mapweave.geometry import se2
-from mapweave.team.alignment_graph import Cluster
 from mapweave.geometry.arrays import FloatArray
-from mapweave.assembly import place, unite_lines
-from mapweave.team.joint_map import build_team_map
 from mapweave.mapping.loop_closing import LoopCloser
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
-from mapweave.team.joint_optimization import JointOptimizer, JointOptimizationParameters
+from mapweave.team.alignment_graph import Cluster
+from mapweave.team.joint_map import build_team_map
+from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 from tests.mapweave.buildings import corridor, part, random_pose
 
 LONG = corridor(
@@ -30,7 +29,7 @@ def submaps(bend: float, frame: FloatArray) -> list[Submap]:
     pose, found = frame, []
     for k in range(10):
         low = 6.0 * k
-        own = place(part(LONG, max(low - 2, 0), min(low + 8, 60)), np.array([-low, 0, 0]))
+        own = part(LONG, max(low - 2, 0), min(low + 8, 60)).moved(np.array([-low, 0, 0]))
         path = Trajectory(np.arange(2), np.zeros(2), np.array([[0.0, 1, 0], [6.0, 1, 0]]))
         found.append(Submap(k, 0, pose, own, path))
         pose = se2.compose(pose, np.array([6.0, 0, bend]))
@@ -49,7 +48,7 @@ def team(
 
 
 def rigid(robot: list[Submap]) -> LineMap:
-    return unite_lines([place(s.map, s.pose) for s in robot])
+    return LineMap.union([s.map.moved(s.pose) for s in robot])
 
 
 def apart(cluster: Cluster, lines: dict[str, LineMap]) -> FloatArray:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.team.min_cut import groups, weakest_cut, weakest_cut_of_all
 from mapweave.team.cycles import Edge
+from mapweave.team.min_cut import groups, weakest_cut, weakest_cut_of_all
 
 
 def random_graph(rng: Generator) -> tuple[list[Edge], dict[int, float]]:

@@ -7,8 +7,8 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.team.rebase import Change, carry, places_of
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.team.rebase import Change, carry, places_of
 from tests.mapweave.buildings import line_map, random_pose, rectangle, walls_of
 
 ROOM = line_map(walls_of(rectangle(-2, -2, 2, 2)))

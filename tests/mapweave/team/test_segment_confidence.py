@@ -5,9 +5,8 @@ import pytest
 from numpy.random import Generator
 
 from mapweave.geometry import se2
-from mapweave.assembly import place
-from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.maps import LineMap
+from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
 from tests.mapweave.buildings import line_map, random_pose, rectangle, walls_of
 
@@ -52,11 +51,11 @@ def test_frames_change_nothing(rng: Generator) -> None:
     here, there = random_pose(rng), random_pose(rng)
     wall = line_map(PARTITION)
     (raster,) = votes(wall, 0, 1)
-    moved = place(line_map(ROOM, FREE), se2.inverse(there))
+    moved = line_map(ROOM, FREE).moved(se2.inverse(there))
     raster_moved = DistanceField.of(moved, DistanceFieldParameters())
     pose = se2.compose(here, there)
     before = segment_confidence(wall, [(raster, np.zeros(3))], P)
-    after = segment_confidence(place(wall, here), [(raster_moved, pose)], P)
+    after = segment_confidence(wall.moved(here), [(raster_moved, pose)], P)
     np.testing.assert_allclose(after, before, atol=0.03)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.random import Generator
 
-from mapweave.assembly import assemble, place, unite_lines
 from mapweave.geometry import se2
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory, component_name
 from tests.mapweave.buildings import BUILDING, part, random_pose
@@ -15,12 +14,12 @@ def test_a_component_holds_its_submaps_at_their_poses_and_no_others(rng: Generat
     """Each submap has a frame of its own; assembled, the building stands where it is."""
     poses = [random_pose(rng) for _ in range(3)]
     submaps = tuple(
-        Submap(k, component, pose, place(lines, se2.inverse(pose)), Trajectory.empty())
+        Submap(k, component, pose, lines.moved(se2.inverse(pose)), Trajectory.empty())
         for k, (component, pose, lines) in enumerate(
             zip([0, 4, 0], poses, [LEFT, LEFT, RIGHT], strict=True)
         )
     )
-    whole = assemble(RobotMap("a", "x", 1, submaps), 0)
+    whole = RobotMap("a", "x", 1, submaps).lines(0)
     np.testing.assert_allclose(
         whole.segments, np.vstack([LEFT.segments, RIGHT.segments]), atol=1e-9
     )
@@ -31,19 +30,19 @@ def test_a_component_holds_its_submaps_at_their_poses_and_no_others(rng: Generat
 
 
 def test_polylines_stay_apart_when_maps_are_united() -> None:
-    united = unite_lines([LEFT, LineMap.empty(), RIGHT])
+    united = LineMap.union([LEFT, LineMap.empty(), RIGHT])
     assert len(united.polylines) == len(LEFT.polylines) + len(RIGHT.polylines)
     assert set(np.diff(united.polyline)) == {0, 1}
 
 
 def test_nothing_united_is_nothing() -> None:
-    assert len(unite_lines([]).segments) == 0
-    assert len(assemble(RobotMap("a", "x", 1, ()), 0).segments) == 0
+    assert len(LineMap.union([]).segments) == 0
+    assert len(RobotMap("a", "x", 1, ()).lines(0).segments) == 0
 
 
 def test_placing_is_a_rigid_motion_of_all_there_is(rng: Generator) -> None:
     pose = random_pose(rng)
-    back = place(place(LEFT, pose), se2.inverse(pose))
+    back = LEFT.moved(pose).moved(se2.inverse(pose))
     np.testing.assert_allclose(back.segments, LEFT.segments, atol=1e-9)
     np.testing.assert_allclose(back.free_space[0], LEFT.free_space[0], atol=1e-9)
     assert back.polyline is LEFT.polyline and back.support is LEFT.support
