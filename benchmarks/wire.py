@@ -12,9 +12,9 @@ from benchmarks.logs import find_logs
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave_deploy.run.display import Lines
 from mapweave_deploy.run.launcher import Plan, TeamOutcome, free_endpoint, run_team
+from mapweave_deploy.run.occupancy import grid_bytes
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.team_plan import Member, team_from_logs
-from mapweave_deploy.sim.occupancy import grid_bytes
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import MapMessage
 

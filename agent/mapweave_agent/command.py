@@ -15,7 +15,7 @@ from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.source import LogSource, ReplayClock, parse_rate
-from mapweave_protocol.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
 from mapweave_protocol.wire.keys import new_boot

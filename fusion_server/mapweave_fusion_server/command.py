@@ -9,7 +9,7 @@ from mapweave.cli import Command, argument, not_negative
 from mapweave_fusion_server.coordinator import CoordinatorParameters
 from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
-from mapweave_protocol.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
 

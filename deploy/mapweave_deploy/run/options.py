@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mapweave.cli import argument, positive
 from mapweave_deploy.sim.simulation import BUILDERS
-from mapweave_protocol.arguments import DEFAULT_TEAM
+from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import MAX_PORT
 
 DEFAULT_ROBOTS = 3

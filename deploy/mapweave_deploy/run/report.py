@@ -16,8 +16,8 @@ from mapweave_deploy.run.evaluation import (
     scan_counts,
 )
 from mapweave_deploy.run.launcher import TeamOutcome
+from mapweave_deploy.run.occupancy import grid_bytes
 from mapweave_deploy.run.team_plan import Member
-from mapweave_deploy.sim.occupancy import grid_bytes
 
 WORLD_LIMITS = Limits(0.3, np.radians(3.0))
 LOG_LIMITS = Limits(0.5, np.radians(5.0))

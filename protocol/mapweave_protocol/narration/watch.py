@@ -16,8 +16,8 @@ from rich.table import Table
 from rich.text import Text
 
 from mapweave.cli import Command
-from mapweave_protocol.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.asking import ask_joint_maps
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
 from mapweave_protocol.link.inbox import (

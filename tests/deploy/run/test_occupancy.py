@@ -3,7 +3,7 @@
 import numpy as np
 
 from mapweave.scan.scan import Scan
-from mapweave_deploy.sim.occupancy import CELL, FREE, OCCUPIED, UNKNOWN, draw_grid
+from mapweave_deploy.run.occupancy import CELL, FREE, OCCUPIED, UNKNOWN, draw_grid
 
 
 def circle(radius: float) -> Scan:
