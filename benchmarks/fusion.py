@@ -18,6 +18,7 @@ from benchmarks.pairs import Match, Outcome, Pair, choose_pairs, compare
 from benchmarks.stretches import Stretch, map_stretches
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.commands.progress import track
+from mapweave.evidence import RunnerUp
 
 ROWS = OUTPUT / "fusion.json"
 BENT = 0.3  # [m] rms from which on a map is named as bent
@@ -106,7 +107,7 @@ def _is_wrong(match: Match) -> bool:
 def _tell_match(pair: Pair, match: Match) -> str:
     a = match.alignment
     bends = " and ".join(f"{bend:.2f} m" for bend in match.bends)
-    numbers = ", ".join(f"{name} {value:.2f}" for name, value in a.evidence.items())
+    numbers = ", ".join(f"{name} {value:.2f}" for name, value in a.evidence.by_name().items())
     off = "other building" if pair.crosses else f"{match.distance:.2f} m {_degrees(match)} off"
     return (
         f"{a.reference} - {a.other}: {off}, {pair.common:.0f} m truly in common, maps bent by"
@@ -152,11 +153,17 @@ def _match_row(match: Match) -> dict[str, object]:
         "decision": a.decision,
         "confidence": a.confidence,
         "reason": a.reason,
-        "evidence": dict(a.evidence),
-        "runner_up": a.runner_up,
+        "evidence": a.evidence.by_name(),
+        "runner_up": _rival(a.runner_up),
         "transform": a.transform.tolist(),
         "distance": match.distance if math.isfinite(match.distance) else None,
         "turn": match.turn,
         "right": match.right,
         "bends": match.bends,
     }
+
+
+def _rival(runner_up: RunnerUp | None) -> dict[str, object] | None:
+    if runner_up is None:
+        return None
+    return {"transform": runner_up.transform.tolist(), **runner_up.by_name()}

@@ -13,13 +13,12 @@ from benchmarks.pairs import compare
 from benchmarks.stretches import Stretch, map_stretches
 from benchmarks.tables import format_table
 from mapweave.commands.progress import track
-from mapweave.fusion.confidence import percent
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, Submap, lines_of, submaps_by_component
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.reasons import Reason, StatusKind
 from mapweave.team.alignment_graph import (
-    SET_ASIDE,
     AlignmentGraphParameters,
     Cluster,
     cluster_components,
@@ -27,6 +26,7 @@ from mapweave.team.alignment_graph import (
 from mapweave.team.cycles import Edge
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 from mapweave.team.min_cut import weakest_cut
+from mapweave.text import percent
 
 FALSE_CONFIDENCE = 0.99  # the surest there is
 LEAST_ERROR = 2.0  # [m] that a false alignment is off
@@ -111,7 +111,7 @@ def run(options: argparse.Namespace) -> None:
             [log.name, *_tell_clusters(team, clusters, woven), *_tell_trials(team, options)]
         )
         for alignment in judged:
-            if alignment.reason.startswith(SET_ASIDE):
+            if _is_set_aside(alignment):
                 print(f"  {alignment.reference} - {alignment.other}: {alignment.reason}")
     print(format_table(HEAD, rows))
     print(
@@ -152,7 +152,7 @@ def _false_alignment(team: Team, names: Sequence[str], rng: Generator) -> Alignm
     middle = np.array([*team.ends[b].mean(axis=0), 0.0])
     there = se2.compose(se2.between(team.frames[a], team.frames[b]), middle)
     transform = se2.compose(se2.compose(there, off), se2.inverse(middle))
-    return Alignment(a, b, transform, "accepted", FALSE_CONFIDENCE, "injected")
+    return Alignment(a, b, transform, "accepted", FALSE_CONFIDENCE, Reason.words("injected"))
 
 
 def is_held_twice(cluster: Cluster, judged: Sequence[Alignment], false: Alignment) -> bool:
@@ -170,11 +170,14 @@ def is_held_twice(cluster: Cluster, judged: Sequence[Alignment], false: Alignmen
 
 def _holds(team: Team, cluster: Cluster, false: Alignment) -> bool:
     (there, *_), judged = team.join([*team.alignments, false])
-    named = judged[-1].reason.startswith(SET_ASIDE)
-    return named and all(
+    return _is_set_aside(judged[-1]) and all(
         name in there.poses and np.allclose(there.poses[name], pose, atol=SAME_POSE)
         for name, pose in cluster.poses.items()
     )
+
+
+def _is_set_aside(alignment: Alignment) -> bool:
+    return alignment.status is not None and alignment.status.kind is StatusKind.SET_ASIDE
 
 
 def fit_frame(points: FloatArray, targets: FloatArray) -> FloatArray:

@@ -36,6 +36,14 @@ class InvalidIdError(MapweaveError):
         self.name = name
 
 
+class InvalidComponentError(MapweaveError):
+    """A name that is not of a robot's component."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"component {name!r}: expected a robot's id and a number, such as 'a/0'")
+        self.name = name
+
+
 class MissingExtraError(MapweaveError):
     """An optional package that the asked-for output needs."""
 

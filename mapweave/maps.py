@@ -10,8 +10,12 @@ from typing import Literal
 
 import numpy as np
 
+from mapweave.errors import InvalidComponentError
+from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.reasons import Reason, Status
+from mapweave.text import tell_reason
 
 Decision = Literal["accepted", "ambiguous", "refused"]
 
@@ -179,12 +183,14 @@ class Alignment:
         Accepted, ambiguous or refused.
     confidence
         Probability that the transform is right within 0.5 m and 5°, at the median over the map.
-    reason
-        One sentence for a person.
+    cause
+        Why it was decided so: a kind and its numbers.
     evidence
-        The numbers behind the decision, by name.
+        The numbers behind the decision.
     runner_up
-        The best *different* hypothesis: ``{"transform": [x, y, theta], …numbers}``.
+        The best *different* hypothesis, where there is any.
+    status
+        What became of it in a joint map; None outside, and of what never was accepted.
     """
 
     reference: str
@@ -192,9 +198,15 @@ class Alignment:
     transform: FloatArray
     decision: Decision
     confidence: float
-    reason: str
-    evidence: Mapping[str, float] = field(default_factory=dict)
-    runner_up: Mapping[str, object] | None = None
+    cause: Reason
+    evidence: Evidence = field(default_factory=Evidence)
+    runner_up: RunnerUp | None = None
+    status: Status | None = None
+
+    @property
+    def reason(self) -> str:
+        """One sentence for a person: the cause, and what became of it."""
+        return tell_reason(self.cause, (self.reference, self.other), self.status)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,6 +243,20 @@ class JointMap:
 def component_name(robot: str, component: int) -> str:
     """Return the name of a robot's component, such as ``a/0``."""
     return f"{robot}/{component}"
+
+
+def parse_component(name: str) -> tuple[str, int]:
+    """Return the robot and the number of the component called `name`, such as ``a/0``.
+
+    Raises
+    ------
+    InvalidComponentError
+        If it is no such name.
+    """
+    robot, slash, number = name.rpartition("/")
+    if not robot or not slash or not (number.isascii() and number.isdigit()):
+        raise InvalidComponentError(name)
+    return robot, int(number)
 
 
 def lines_of(submaps: Iterable[Submap]) -> LineMap:

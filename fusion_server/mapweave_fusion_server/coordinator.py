@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.maps import Alignment, JointMap, RobotMap, component_name
+from mapweave.maps import Alignment, JointMap, RobotMap, component_name, parse_component
 from mapweave.team.joint_map import build_team_map
 from mapweave.team.joint_optimization import JointOptimizer
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
@@ -195,7 +195,7 @@ class Coordinator:
                 for alignment in message.unpack():
                     if {alignment.reference, alignment.other} <= existing:
                         ends = alignment.reference, alignment.other
-                        ours, theirs = (changes[name.split("/")[0]] for name in ends)
+                        ours, theirs = (changes[parse_component(name)[0]] for name in ends)
                         yield carry(alignment, ours, theirs)
 
     def _remember_state(self, robot_map: RobotMap) -> None:

@@ -9,12 +9,12 @@ from mapweave.cli import Command
 from mapweave.commands.progress import track
 from mapweave.errors import FileError
 from mapweave.fusion.align import align_robots
-from mapweave.fusion.confidence import percent
 from mapweave.io.map_files import read_map, write_joint
-from mapweave.maps import Alignment, JointMap, RobotMap
+from mapweave.maps import Alignment, JointMap, RobotMap, parse_component
 from mapweave.pictures.picture import check_picture_suffix, draw_joint
 from mapweave.team.joint_map import build_team_map
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
+from mapweave.text import percent
 
 EXIT_NOT_ALL_JOINED = 3
 
@@ -90,7 +90,7 @@ def _tell_components(joint: JointMap) -> list[str]:
 def _all_robots_joined(joint: JointMap, robots: int) -> bool:
     """Whether one component has a part of every robot."""
     return any(
-        len({name.partition("/")[0] for name in component.robots}) == robots
+        len({parse_component(name)[0] for name in component.robots}) == robots
         for component in joint.components
     )
 

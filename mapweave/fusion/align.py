@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.fusion.confidence import ConfidenceParameters, confidence, percent
-from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, numbers, runner_up
+from mapweave.fusion.confidence import ConfidenceParameters, confidence
+from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
 from mapweave.fusion.parts import PartParameters, agreed, cut
 from mapweave.geometry import se2
@@ -23,6 +23,7 @@ from mapweave.matching.distance_field import DistanceFieldParameters
 from mapweave.matching.hypotheses import HypothesisParameters, PreparedMap, different, hypothesise
 from mapweave.matching.icp import IcpParameters, Target, align_all
 from mapweave.matching.verification import VerificationParameters, shared_complexity, verify
+from mapweave.reasons import Reason, ReasonKind
 
 
 class FusionParameters(BaseModel):
@@ -96,20 +97,18 @@ def _for_wholes(
 
     Where the place was proven, its evidence tells how sure that is.
     """
-    if first is None or second is None or not found.evidence:
+    if first is None or second is None or found.evidence.is_empty:
         return found
     far = reach(first.raster, second.raster, found.transform, p.verification)
     sure = found.confidence * holds(far, p.reach)
-    evidence = {**found.evidence, "reach": far}
-    if found.decision == "accepted":
-        evidence["place"] = found.confidence
-    if found.decision != "accepted" or sure >= p.decision.min_confidence:
-        return replace(found, confidence=sure, evidence=evidence)
-    reason = (
-        f"{found.reason}; but from there the maps go on for {far:.0f} m, where they may be bent"
-        f" by more than {p.reach.tolerance:g} m: right as a whole with {percent(sure)} only"
-    )
-    return replace(found, decision="ambiguous", confidence=sure, reason=reason, evidence=evidence)
+    if found.decision != "accepted":
+        return replace(found, confidence=sure, evidence=replace(found.evidence, reach=far))
+    measured = replace(found.evidence, reach=far, place=found.confidence)
+    if sure >= p.decision.min_confidence:
+        return replace(found, confidence=sure, evidence=measured)
+    numbers = {"reach": far, "tolerance": p.reach.tolerance, "confidence": sure}
+    cause = Reason(ReasonKind.BENT, numbers, found.cause)
+    return replace(found, decision="ambiguous", confidence=sure, cause=cause, evidence=measured)
 
 
 def align_maps(
@@ -149,22 +148,22 @@ def compare(
         propose.
     """
     if first is None or second is None:
-        poor = a if first is None else b
-        return _no_alignment(a, b, f"{poor} has less than {p.min_wall:g} m of wall to compare")
+        poor = ReasonKind.SMALL_REFERENCE if first is None else ReasonKind.SMALL_OTHER
+        return _no_alignment(a, b, Reason(poor, {"min_wall": p.min_wall}))
     ranked = find_alignments(first, second, p, possible)
     if not ranked:
-        return _no_alignment(a, b, "no part of one has the shape of a part of the other")
+        return _no_alignment(a, b, Reason(ReasonKind.NO_SHAPE))
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
-    decision, reason = decide(best, rival, sure, p.decision)
+    decision, cause = decide(best, rival, sure, p.decision)
     return Alignment(
         a,
         b,
         best.transform,
         decision,
         sure,
-        reason,
-        numbers(best),
+        cause,
+        evidence(best),
         None if rival is None else runner_up(best, rival),
     )
 
@@ -216,5 +215,5 @@ def _complexity(
     )
 
 
-def _no_alignment(a: str, b: str, reason: str) -> Alignment:
-    return Alignment(a, b, np.zeros(3), "refused", 0.0, reason)
+def _no_alignment(a: str, b: str, cause: Reason) -> Alignment:
+    return Alignment(a, b, np.zeros(3), "refused", 0.0, cause)

@@ -58,8 +58,3 @@ def _rivalry(best: Verdict, rival: Verdict | None) -> float:
     if rival is None:
         return 0.0
     return min(max(rival.score / max(best.score, 1e-9), 0.0), 1.0)
-
-
-def percent(probability: float) -> str:
-    """Return a probability for a person; what would round to 100 % is not certain all the same."""
-    return "over 99%" if probability >= 0.995 else f"{probability:.0%}"

@@ -5,16 +5,17 @@ direction, share a shape or be held well by straight walls, and leave the best *
 hypothesis far behind. Each condition that fails is the reason given.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.fusion.confidence import percent
+from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Decision
 from mapweave.matching.verification import Verdict
+from mapweave.reasons import Reason, ReasonKind
 
 
 class DecisionParameters(BaseModel):
@@ -84,51 +85,38 @@ class Hypothesis:
 
 def decide(
     best: Hypothesis, rival: Hypothesis | None, sure: float, p: DecisionParameters
-) -> tuple[Decision, str]:
-    """Return the decision and one sentence that gives the reason; `sure` is the confidence."""
+) -> tuple[Decision, Reason]:
+    """Return the decision and its reason; `sure` is the confidence."""
     v = best.verdict
-    found = _tell(v)
+    match = {"common": v.common, "contradicted": v.contradicted}
     if v.common < p.min_common:
-        return "refused", f"only {v.common:.1f} m of wall in common"
+        return "refused", Reason(ReasonKind.LITTLE_COMMON, {"common": v.common})
     if v.overlap < p.min_overlap:
-        return (
-            "refused",
-            f"{v.common:.0f} m of wall in common, but {v.contradicted:.0f} m of wall"
-            " where the other saw free space",
-        )
+        return "refused", Reason(ReasonKind.CONTRADICTED, match)
     if v.held < p.min_held:
-        return "ambiguous", f"{found}; nearly all of it parallel, so one may slide along the other"
+        return "ambiguous", Reason(ReasonKind.PARALLEL, match)
     if best.complexity < p.min_complexity and v.held < p.plain_held:
-        return "ambiguous", f"{found}; but only straight walls, no shape that tells places apart"
+        return "ambiguous", Reason(ReasonKind.STRAIGHT, match)
     if rival is not None and rival.verdict.score > p.max_rival * v.score:
-        as_well = f"fits as well, with {_tell(rival.verdict)}"
-        return "ambiguous", f"{found}; but {_elsewhere(best, rival)} {as_well}"
-    next_best = _next_best(best, rival)
+        return "ambiguous", Reason(ReasonKind.RIVAL, {**match, **_against(best, rival)})
+    # Of a rival that shares next to nothing there is nothing to tell.
+    next_best = {} if rival is None or rival.verdict.common < 1 else _against(best, rival)
     lead = v.score - (max(rival.verdict.score, 0.0) if rival else 0.0)
     if sure < p.min_confidence or lead < p.min_lead:
-        return (
-            "ambiguous",
-            f"{found}; {next_best}; too little to be sure of the place ({percent(sure)})",
-        )
-    return "accepted", f"{found}; {next_best}"
+        return "ambiguous", Reason(ReasonKind.UNSURE, {**match, **next_best, "confidence": sure})
+    return "accepted", Reason(ReasonKind.CONVINCING, {**match, **next_best})
 
 
-def _tell(verdict: Verdict) -> str:
-    return f"{verdict.common:.0f} m of wall in common, {verdict.contradicted:.1f} m contradicted"
-
-
-def _next_best(best: Hypothesis, rival: Hypothesis | None) -> str:
-    """The rival and what speaks for and against it, in words."""
-    if rival is None or rival.verdict.common < 1:
-        return "nothing else fits"
-    return f"next best, {_elsewhere(best, rival)}, has {_tell(rival.verdict)}"
-
-
-def _elsewhere(best: Hypothesis, rival: Hypothesis) -> str:
-    """How the rival differs, in words."""
+def _against(best: Hypothesis, rival: Hypothesis) -> dict[str, float]:
+    """How the rival differs, and what speaks for and against it."""
     distance, turn = _difference(best, rival)
-    away, degrees = f"{distance:.0f} m away", np.degrees(turn)
-    return away if degrees < 9 else f"{away} and turned by {degrees:.0f}°"
+    verdict = rival.verdict
+    return {
+        "distance": distance,
+        "turn": turn,
+        "rival_common": verdict.common,
+        "rival_contradicted": verdict.contradicted,
+    }
 
 
 def _difference(best: Hypothesis, rival: Hypothesis) -> tuple[float, float]:
@@ -138,19 +126,21 @@ def _difference(best: Hypothesis, rival: Hypothesis) -> tuple[float, float]:
     return float(np.hypot(x, y)), float(abs(turn))
 
 
-def numbers(hypothesis: Hypothesis) -> dict[str, float]:
-    """Return the evidence by name, with the score."""
-    verdict = hypothesis.verdict
-    numbers = {k: float(v) for k, v in asdict(verdict).items() if k != "contradiction_weight"}
-    return {**numbers, "complexity": hypothesis.complexity, "score": verdict.score}
+def evidence(hypothesis: Hypothesis) -> Evidence:
+    """Return the numbers that speak for and against `hypothesis`, with the score."""
+    v = hypothesis.verdict
+    return Evidence(
+        float(v.common),
+        float(v.contradicted),
+        float(v.overlap),
+        float(v.residual),
+        float(v.held),
+        hypothesis.complexity,
+        v.score,
+    )
 
 
-def runner_up(best: Hypothesis, rival: Hypothesis) -> dict[str, object]:
-    """Return the rival's transform, how it differs [m], [rad], and its evidence by name."""
+def runner_up(best: Hypothesis, rival: Hypothesis) -> RunnerUp:
+    """Return the rival, how it differs, and its evidence."""
     distance, turn = _difference(best, rival)
-    return {
-        "transform": [float(v) for v in rival.transform],
-        "distance": distance,
-        "turn": turn,
-        **numbers(rival),
-    }
+    return RunnerUp(rival.transform, distance, turn, evidence(rival))

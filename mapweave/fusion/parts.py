@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap, RobotMap
+from mapweave.reasons import Reason, ReasonKind
 
 
 class PartParameters(BaseModel):
@@ -67,10 +68,10 @@ def agreed(
     spread, turn = np.max(errors, axis=0)
     if spread > parameters.distance or turn > parameters.turn:
         return None
-    best = max(found, key=lambda a: a.evidence["held"])
-    told = f"{len(found)} pairs of parts agree within {spread:.1f} m; the best held"
-    evidence = {**best.evidence, "parts": float(len(found)), "spread": float(spread)}
-    return replace(best, reason=f"{told}: {best.reason}", evidence=evidence)
+    best = max(found, key=lambda a: a.evidence.held or 0.0)
+    agreement = {"parts": float(len(found)), "spread": float(spread)}
+    cause = Reason(ReasonKind.PARTS_AGREE, agreement, best.cause)
+    return replace(best, cause=cause, evidence=replace(best.evidence, **agreement))
 
 
 def difference(one: FloatArray, other: FloatArray, middle: FloatArray) -> tuple[float, float]:

@@ -6,7 +6,7 @@ Numbers are rounded to 0.1 mm and 1 µrad, far below what a laser resolves, to k
 import json
 import math
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,10 +16,12 @@ from pydantic import ValidationError
 
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError
+from mapweave.evidence import RunnerUp
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.io.map_schema import JOINT_FORMAT, MAP_FORMAT, HeaderFile, JointFile, MapFile
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
 from mapweave.maps import Alignment, JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
+from mapweave.reasons import Reason, Status
 
 _EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
 _METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
@@ -194,9 +196,36 @@ def _alignment(alignment: Alignment) -> dict[str, object]:
         "confidence": _number(alignment.confidence, _RATIOS),
         "decision": alignment.decision,
         "reason": alignment.reason,
-        "evidence": _plain(alignment.evidence),
-        "runner_up": _plain(alignment.runner_up),
+        "evidence": _ratios(alignment.evidence.by_name()),
+        "runner_up": _runner_up(alignment.runner_up),
+        **_status(alignment.status),
+        "cause": _cause(alignment.cause),
     }
+
+
+def _runner_up(runner_up: RunnerUp | None) -> dict[str, object] | None:
+    if runner_up is None:
+        return None
+    transform = [_number(value, _RATIOS) for value in runner_up.transform]
+    return {"transform": transform, **_ratios(runner_up.by_name())}
+
+
+def _status(status: Status | None) -> dict[str, object]:
+    if status is None:
+        return {"status": None, "set_aside_by": [], "revoked_in": None}
+    return {
+        "status": status.kind,
+        "set_aside_by": status.set_aside_by,
+        "revoked_in": status.revoked_in,
+    }
+
+
+def _cause(cause: Reason) -> dict[str, object]:
+    """Return the kind and, beside it, its numbers: in full, as the sentence is made of them."""
+    numbers = {n: float(v) if math.isfinite(v) else None for n, v in cause.numbers.items()}
+    text = {"text": cause.text} if cause.text else {}
+    found = {} if cause.found is None else {"found": _cause(cause.found)}
+    return {"kind": cause.kind, **numbers, **text, **found}
 
 
 def _component(component: JointComponent) -> dict[str, object]:
@@ -223,12 +252,6 @@ def _number(value: float, decimals: int) -> float | None:
     return round(float(value), decimals) if math.isfinite(value) else None
 
 
-def _plain(value: object) -> object:
-    """Return `value` as JSON can hold it: no arrays, and ``null`` for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(entry) for name, entry in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(entry) for entry in value]
-    return _number(value, _RATIOS) if isinstance(value, float) else value
+def _ratios(numbers: Mapping[str, float]) -> dict[str, float | None]:
+    """Return `numbers` as JSON can hold them: ``null`` for what is not finite."""
+    return {name: _number(number, _RATIOS) for name, number in numbers.items()}

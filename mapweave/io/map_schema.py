@@ -18,6 +18,7 @@ from pydantic import (
     model_validator,
 )
 
+from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import ID_PATTERN
 from mapweave.maps import (
@@ -30,6 +31,7 @@ from mapweave.maps import (
     Submap,
     Trajectory,
 )
+from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 
 _MapFormat: TypeAlias = Literal["mapweave/map/1"]
 _JointFormat: TypeAlias = Literal["mapweave/joint/1"]
@@ -59,7 +61,6 @@ _Polygon: TypeAlias = Annotated[list[tuple[_Metre, _Metre]], Field(min_length=3)
 _TrajectoryRow: TypeAlias = tuple[_Count, float | None, _Metre, _Metre, float]
 _Deviation: TypeAlias = Annotated[float, Field(ge=0, le=1e6)]
 _UncertaintyRow: TypeAlias = tuple[_Deviation, _Deviation, _Deviation, float]
-_Fact: TypeAlias = int | float | str | bool | list[float] | dict[str, float | None] | None
 _RobotId: TypeAlias = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 _ComponentName: TypeAlias = Annotated[
     str, StringConstraints(pattern=ID_PATTERN.removesuffix("$") + "/[0-9]{1,9}$")
@@ -158,13 +159,62 @@ class MapFile(_Model):
         return RobotMap(self.robot, self.boot, self.version, submaps)
 
 
-class RunnerUpFile(_Model):
-    """The ``runner_up`` of an alignment: a transform, and whatever is known of it."""
+class EvidenceFile(_Model):
+    """The ``evidence`` of an alignment; what could not be measured is left out or ``null``."""
 
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, _Fact]
+    common: float | None = None
+    contradicted: float | None = None
+    overlap: float | None = None
+    residual: float | None = None
+    held: float | None = None
+    complexity: float | None = None
+    score: float | None = None
+    parts: float | None = None
+    spread: float | None = None
+    reach: float | None = None
+    place: float | None = None
+
+    def numbers(self) -> dict[str, float]:
+        """Return what the file gives, by name."""
+        given = self.model_dump(include=self.model_fields_set - {"transform"})
+        return {name: _unknown_as_nan(number) for name, number in given.items()}
+
+
+class RunnerUpFile(EvidenceFile):
+    """The ``runner_up`` of an alignment."""
 
     transform: _Pose
+    distance: float | None = None
+    turn: float | None = None
+
+    def to_runner_up(self) -> RunnerUp:
+        """Return it as the library's value."""
+        return RunnerUp.of(np.array(self.transform), self.numbers())
+
+
+class CauseFile(_Model):
+    """The ``cause`` of an alignment: a kind, and beside it the numbers of that kind."""
+
+    model_config = ConfigDict(extra="allow")
+
+    kind: str
+    text: str = ""
+    found: "CauseFile | None" = None
+
+    @model_validator(mode="after")
+    def _numbers_fit(self) -> "CauseFile":
+        self.to_reason()
+        return self
+
+    def to_reason(self) -> Reason | None:
+        """Return it as the library's value; None if it, or what it is about, is not known here."""
+        found = None if self.found is None else self.found.to_reason()
+        if self.kind not in set(ReasonKind) or (found is None and self.found is not None):
+            return None
+        extra = self.model_extra or {}
+        numbers = {n: v for n, v in extra.items() if v is None or isinstance(v, int | float)}
+        known = {name: _unknown_as_nan(number) for name, number in numbers.items()}
+        return Reason.picked(ReasonKind(self.kind), known, found, self.text)
 
 
 class AlignmentFile(_Model):
@@ -176,21 +226,41 @@ class AlignmentFile(_Model):
     confidence: _Probability
     decision: Decision
     reason: str
-    evidence: dict[str, float | None]
+    evidence: EvidenceFile
     runner_up: RunnerUpFile | None
+    status: StatusKind | None = None
+    set_aside_by: list[tuple[_ComponentName, _ComponentName]] = []
+    revoked_in: _Count | None = None
+    cause: CauseFile | None = None
+
+    @model_validator(mode="after")
+    def _status_fits(self) -> "AlignmentFile":
+        self._status()
+        return self
 
     def to_alignment(self) -> Alignment:
-        """Return it as the library's value."""
+        """Return it as the library's value.
+
+        Where the cause is not given, or of a kind that is not known here, the sentence is all that
+        is known: it says as well what became of the alignment.
+        """
+        cause = None if self.cause is None else self.cause.to_reason()
         return Alignment(
             reference=self.reference,
             other=self.other,
             transform=np.array(self.transform),
             decision=self.decision,
             confidence=self.confidence,
-            reason=self.reason,
-            evidence={name: _unknown_as_nan(value) for name, value in self.evidence.items()},
-            runner_up=None if self.runner_up is None else self.runner_up.model_dump(mode="json"),
+            cause=Reason.words(self.reason) if cause is None else cause,
+            evidence=Evidence.of(self.evidence.numbers()),
+            runner_up=None if self.runner_up is None else self.runner_up.to_runner_up(),
+            status=None if cause is None else self._status(),
         )
+
+    def _status(self) -> Status | None:
+        if self.status is None:
+            return None
+        return Status(self.status, tuple(self.set_aside_by), self.revoked_in)
 
 
 class ComponentFile(_LinesFile):

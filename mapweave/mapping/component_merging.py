@@ -159,8 +159,8 @@ class ComponentMerger:
         )
         here = compare(names[0], first, names[1], second, expected, possible)
         # A better place elsewhere says that it was carried away.
-        best = max(anywhere.evidence.get("score", 0.0), 0.0)
-        return here if here.evidence.get("score", 0.0) >= 0.95 * best else anywhere
+        best = max(anywhere.evidence.score or 0.0, 0.0)
+        return here if (here.evidence.score or 0.0) >= 0.95 * best else anywhere
 
     def _shape(self, submaps: Sequence[Submap], component: int) -> PreparedMap | None:
         """Prepare a component, unless it is as it was the last time."""

@@ -6,10 +6,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from mapweave.fusion.confidence import percent
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, component_name
+from mapweave.maps import (
+    JointComponent,
+    JointMap,
+    LineMap,
+    RobotMap,
+    Submap,
+    component_name,
+    parse_component,
+)
+from mapweave.text import percent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +76,7 @@ class Scene:
 
 def robot_of(component: str) -> str:
     """Return the robot's id in a component's name, such as ``a`` in ``a/0``."""
-    return component.partition("/")[0]
+    return parse_component(component)[0]
 
 
 def tell_confidence(scene: Scene) -> list[str]:

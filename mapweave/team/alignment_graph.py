@@ -18,6 +18,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.maps import Alignment
 from mapweave.matching.distance_field import DistanceField
+from mapweave.reasons import Pair, Reason, ReasonKind, Status, StatusKind
 from mapweave.team.consistency import ConsistencyParameters, bits, explain
 from mapweave.team.contradictions import (
     ContradictionParameters,
@@ -28,9 +29,6 @@ from mapweave.team.contradictions import (
 from mapweave.team.cycles import Edge, misfit, poses_along
 from mapweave.team.inliers import component_confidence, part_right, rely, weakest_link
 from mapweave.team.min_cut import groups
-
-SET_ASIDE = "set aside: "  # begins the reason of an accepted alignment that is not relied on
-REASON_LENGTH = 500  # characters, as many as a message carries
 
 
 class AlignmentGraphParameters(BaseModel):
@@ -61,11 +59,6 @@ class Cluster:
     confidence: float
 
 
-def shortened(reason: str) -> str:
-    """Return `reason`, cut off where it is too long."""
-    return reason if len(reason) <= REASON_LENGTH else f"{reason[: REASON_LENGTH - 1]}…"
-
-
 def cluster_components(
     names: Sequence[str],
     alignments: Sequence[Alignment],
@@ -74,6 +67,7 @@ def cluster_components(
 ) -> tuple[list[Cluster], tuple[Alignment, ...]]:
     """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
 
+    Each that was accepted has a status: relied on, held or set aside.
     What contradictions leave of an alignment's confidence is given with it. Alignments that name
     components not in `names` are left out.
 
@@ -121,7 +115,7 @@ class _Graph:
         first, second = self._number[link.reference], self._number[link.other]
         there = se2.compose(link.transform, self._middles[second])
         # What is asked first is whether the places are right; that maps are bent is no objection.
-        bent = bend(link.evidence.get("reach", 0.0), self._parameters.reach)
+        bent = bend(link.evidence.reach or 0.0, self._parameters.reach)
         return Edge(first, second, se2.between(self._middles[first], there), _place(link), bent)
 
     def clusters(self) -> list[Cluster]:
@@ -140,32 +134,35 @@ class _Graph:
         """Return `alignment`: less sure if others contradict it, and ambiguous if set aside."""
         edge = self._edge_of.get(id(alignment))
         if edge is None:
-            return alignment
+            return replace(alignment, status=None)
         sure = min(alignment.confidence, part_right(edge, self._explanations))
         if edge not in self._right:
-            reason = shortened(f"{SET_ASIDE}{self._objection(edge)}; {alignment.reason}")
-            return replace(alignment, decision="ambiguous", confidence=sure, reason=reason)
-        return alignment if sure == alignment.confidence else replace(alignment, confidence=sure)
+            cause, by = self._objection(edge, alignment.cause)
+            status = Status(StatusKind.SET_ASIDE, by)
+            return replace(
+                alignment, decision="ambiguous", confidence=sure, cause=cause, status=status
+            )
+        is_held = alignment.cause.kind is ReasonKind.MET_BEFORE
+        status = Status(StatusKind.HELD if is_held else StatusKind.RELIED_ON)
+        return replace(alignment, confidence=sure, status=status)
 
-    def _objection(self, k: int) -> str:
-        """What speaks against edge `k`, in words."""
+    def _objection(self, k: int, found: Reason) -> tuple[Reason, tuple[Pair, ...]]:
+        """Return what speaks against edge `k`, of which this was `found`, and who says so."""
         edge = self._edges[k]
         present = sorted(self._right)
         poses, paths = poses_along(edge.first, len(self._names), self._edges, present)
         if paths[edge.second] >= 0:
             off = misfit(edge.transform, poses[edge.first], poses[edge.second])
-            others = sorted(self._tell(other) for other in bits(paths[edge.second]))
-            return (
-                f"{np.hypot(off[0], off[1]):.1f} m and {np.degrees(abs(off[2])):.0f}° off what"
-                f" {_enumerate(others)} {'say' if len(others) > 1 else 'says'}"
-            )
+            others = sorted((self._ends(other) for other in bits(paths[edge.second])), key="-".join)
+            numbers = {"distance": float(np.hypot(off[0], off[1])), "turn": float(abs(off[2]))}
+            return Reason(ReasonKind.OTHERS_CONTRADICT, numbers, found), tuple(others)
         alone = self._witness_against(k, [*present, k])
         if alone:
-            return self._tell_witness(alone)
+            return self._testimony(ReasonKind.MAPS_CONTRADICT, alone, found)
         together = self._witness_against(k, range(len(self._edges)))
         if together:
-            return f"{self._tell_witness(together)}, by this alignment or another one between them"
-        return "contradicts others, and nothing tells for sure which is wrong"
+            return self._testimony(ReasonKind.MAPS_CONTRADICT_JOINTLY, together, found)
+        return Reason(ReasonKind.UNDECIDED, found=found), ()
 
     def _witness_against(self, k: int, present: Sequence[int]) -> PairVerdict | None:
         """Who speaks most against those joined by way of edge `k`, with the edges `present`."""
@@ -176,17 +173,16 @@ class _Graph:
                 found.append(witness)
         return max(found, key=lambda witness: witness.doubt, default=None)
 
-    def _tell_witness(self, witness: PairVerdict) -> str:
-        first, second = self._names[witness.first], self._names[witness.second]
-        verdict = witness.verdict
-        return (
-            f"{first} and {second} would have {verdict.contradicted:.0f} m of wall where the other"
-            f" saw free space, {verdict.common:.0f} m in common"
-        )
+    def _testimony(
+        self, kind: ReasonKind, witness: PairVerdict, found: Reason
+    ) -> tuple[Reason, tuple[Pair, ...]]:
+        v = witness.verdict
+        cause = Reason(kind, {"common": v.common, "contradicted": v.contradicted}, found)
+        return cause, ((self._names[witness.first], self._names[witness.second]),)
 
-    def _tell(self, k: int) -> str:
+    def _ends(self, k: int) -> Pair:
         edge = self._edges[k]
-        return f"{self._names[edge.first]}-{self._names[edge.second]}"
+        return self._names[edge.first], self._names[edge.second]
 
     def _poses(self, group: Sequence[int]) -> dict[str, FloatArray]:
         """Poses of the components of `group`, the first in its own frame."""
@@ -228,8 +224,8 @@ class _Graph:
 
 def _place(link: Alignment) -> float:
     """How probably the place is right; all that is known where nobody tells of the place."""
-    place = link.evidence.get("place", link.confidence)
-    return place if math.isfinite(place) else link.confidence
+    place = link.evidence.place
+    return place if place is not None and math.isfinite(place) else link.confidence
 
 
 def _rigid(link: Alignment) -> float:
@@ -247,10 +243,3 @@ def _middle(raster: DistanceField | None) -> FloatArray:
     """(3,) frame at the middle of a map's wall; the map's own where it has seen none."""
     x, y = raster.oriented.points.mean(axis=0) if raster else (0.0, 0.0)
     return np.array([x, y, 0.0])
-
-
-def _enumerate(items: Sequence[str]) -> str:
-    """Return `items` in words; of many the first and how many more there are."""
-    if len(items) > 3:
-        return f"{', '.join(items[:2])} and {len(items) - 2} more"
-    return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)

@@ -9,15 +9,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from mapweave.maps import Alignment
-from mapweave.team.alignment_graph import shortened
-
-KEPT = "the robots met before; "  # begins the reason of a join that is kept
+from mapweave.reasons import Reason, ReasonKind
 
 
 def keep_joined(found: Sequence[Alignment]) -> tuple[Alignment, ...]:
     """Return what was `found` of two robots that met, each join accepted whose place is proven."""
     return tuple(
-        _keep(a) if a.decision == "ambiguous" and "place" in a.evidence else a for a in found
+        _keep(a) if a.decision == "ambiguous" and a.evidence.place is not None else a for a in found
     )
 
 
@@ -27,4 +25,5 @@ def joins(found: Sequence[Alignment]) -> bool:
 
 
 def _keep(alignment: Alignment) -> Alignment:
-    return replace(alignment, decision="accepted", reason=shortened(KEPT + alignment.reason))
+    cause = Reason(ReasonKind.MET_BEFORE, found=alignment.cause)
+    return replace(alignment, decision="accepted", cause=cause)

@@ -14,7 +14,8 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.maps import Alignment, RobotMap, Submap
+from mapweave.maps import Alignment, RobotMap, Submap, parse_component
+from mapweave.reasons import Reason, ReasonKind
 
 
 class SubmapPlace(NamedTuple):
@@ -70,13 +71,12 @@ def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
 def _opened(alignment: Alignment) -> Alignment:
     if alignment.decision != "accepted":
         return alignment
-    reason = "what was compared is in another component by now; to be compared again"
-    return replace(alignment, decision="ambiguous", reason=reason)
+    return replace(alignment, decision="ambiguous", cause=Reason(ReasonKind.REBASED))
 
 
 def _then(change: Change, component: str) -> list[tuple[SubmapPlace, Submap]]:
     """Return where submaps were in this component then, and what they are now."""
-    number = int(component.rsplit("/", 1)[1])
+    _, number = parse_component(component)
     now = {s.id if _span(s)[0] is None else ("scan", _span(s)[0]): s for s in change.now.submaps}
     found = []
     for identity, place in change.then.items():

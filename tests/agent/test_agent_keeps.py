@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.reasons import ReasonKind
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import declare_map_publisher, open_session
 from mapweave_protocol.wire import keys
@@ -50,7 +51,7 @@ def test_a_join_is_kept_when_the_map_of_a_peer_has_grown(
     assert joined is not None and kept is not None
     assert joined.decision == "accepted" and joined.confidence > 0.85
     assert kept.decision == "accepted" and kept.confidence < 0.5
-    assert kept.reason.startswith("the robots met before; ")
+    assert kept.cause.kind is ReasonKind.MET_BEFORE
 
 
 def _compares(listener: Listener, peer: RobotMap) -> bool:

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapweave.maps import Alignment, Decision, RobotMap
+from mapweave.reasons import Reason
 from mapweave_agent.comparison_schedule import Comparison, ComparisonSchedule
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_protocol.wire.messages import AlignmentMessage, Compared, MapVersion
@@ -30,7 +31,7 @@ def plan_of(robot: str, peer: str) -> ComparisonSchedule:
 
 
 def alignment(decision: Decision) -> Alignment:
-    return Alignment("a/0", "b/0", np.zeros(3), decision, 0.5, "so")
+    return Alignment("a/0", "b/0", np.zeros(3), decision, 0.5, Reason.words("so"))
 
 
 def found(comparison: Comparison, author: str, *alignments: Alignment) -> AlignmentMessage:

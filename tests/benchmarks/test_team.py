@@ -6,12 +6,13 @@ import pytest
 from benchmarks.team import fit_frame, is_held_twice
 from mapweave.geometry import se2
 from mapweave.maps import Alignment
+from mapweave.reasons import Reason
 from mapweave.team.alignment_graph import Cluster
 from tests.mapweave.buildings import random_pose
 
 
 def alignment(reference: str, other: str) -> Alignment:
-    return Alignment(reference, other, np.zeros(3), "accepted", 0.9, "")
+    return Alignment(reference, other, np.zeros(3), "accepted", 0.9, Reason.words(""))
 
 
 def test_the_frame_that_fits_is_the_motion_that_was_made() -> None:

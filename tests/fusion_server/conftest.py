@@ -30,6 +30,7 @@ from mapweave.maps import (
     Trajectory,
     component_name,
 )
+from mapweave.reasons import Reason
 from mapweave_protocol.link import session
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Inbox, joint_reader
@@ -86,7 +87,7 @@ def _make_alignments(
 ) -> AlignmentMessage:
     """Return what robot `reference` found for component 0 of both."""
     names = component_name(reference.robot, 0), component_name(other.robot, 0)
-    alignment = Alignment(*names, np.array(transform), decision, confidence, reason)
+    alignment = Alignment(*names, np.array(transform), decision, confidence, Reason.words(reason))
     return AlignmentMessage.pack(
         reference.robot, MapVersion.of(reference), MapVersion.of(other), [alignment]
     )

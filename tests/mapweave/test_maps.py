@@ -1,10 +1,12 @@
 """A component is its submaps, each at its pose, side by side."""
 
 import numpy as np
+import pytest
 from numpy.random import Generator
 
+from mapweave.errors import InvalidComponentError
 from mapweave.geometry import se2
-from mapweave.maps import LineMap, RobotMap, Submap, Trajectory, component_name
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory, component_name, parse_component
 from tests.mapweave.buildings import BUILDING, part, random_pose
 
 LEFT, RIGHT = part(BUILDING, 0, 18), part(BUILDING, 8, 30)
@@ -50,3 +52,14 @@ def test_placing_is_a_rigid_motion_of_all_there_is(rng: Generator) -> None:
 
 def test_components_are_named_by_robot_and_number() -> None:
     assert component_name("a", 3) == "a/3"
+    assert parse_component("a/3") == ("a", 3)
+    assert parse_component("r-1_x/12") == ("r-1_x", 12)
+
+
+@pytest.mark.parametrize("name", ["", "a", "a/", "/3", "a/b", "a/-1", "a/3 ", "a/²"])
+def test_what_names_no_component_is_refused_with_what_was_expected(name: str) -> None:
+    with pytest.raises(InvalidComponentError) as caught:
+        parse_component(name)
+    assert str(caught.value) == (
+        f"component {name!r}: expected a robot's id and a number, such as 'a/0'"
+    )

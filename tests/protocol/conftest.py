@@ -10,6 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from mapweave.evidence import Evidence, RunnerUp
 from mapweave.maps import (
     Alignment,
     JointComponent,
@@ -19,6 +20,7 @@ from mapweave.maps import (
     Submap,
     Trajectory,
 )
+from mapweave.reasons import Reason
 
 ROUTER = """
 import sys, zenoh
@@ -69,9 +71,9 @@ def make_random_joint(seed: int, version: int = 1) -> JointMap:
         rng.normal(0, 1, 3),
         "ambiguous",
         0.4,
-        "two places look alike",
-        {"common": 3.5},
-        {"transform": [1.0, 2.0, 3.0], "common": 3.0},
+        Reason.words("two places look alike"),
+        Evidence(common=3.5),
+        RunnerUp(np.array([1.0, 2.0, 3.0]), evidence=Evidence(common=3.0)),
     )
     return JointMap(version, (component,), (alignment,))
 

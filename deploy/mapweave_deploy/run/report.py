@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mapweave.fusion.confidence import percent
 from mapweave.maps import Alignment, JointComponent, RobotMap
+from mapweave.text import percent
 from mapweave_deploy.run.evaluation import (
     Limits,
     PairEvaluation,

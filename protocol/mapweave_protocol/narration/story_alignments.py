@@ -1,17 +1,15 @@
 """What was found about pairs of maps, told once: again only when the decision or reason changes."""
 
-import re
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from mapweave.fusion.confidence import percent
 from mapweave.maps import Alignment, Decision, JointMap
-from mapweave.team.revocation import objection
+from mapweave.reasons import ReasonKind
+from mapweave.text import percent, tell_cause
 from mapweave_protocol.wire.messages import AlignmentMessage
 
 Runs: TypeAlias = tuple[str, str]  # of the two robots: each numbers its components from 0 again
-_NUMBER = re.compile(r"[0-9]+([.,][0-9]+)?")
 
 
 @dataclass
@@ -20,14 +18,14 @@ class _Told:
 
     Attributes
     ----------
-    gists
-        Of the reasons told for this decision.
+    kinds
+        Of the reasons told for this decision, whatever their numbers.
     runs
         None where only the joint map told of it.
     """
 
     decision: Decision
-    gists: set[str]
+    kinds: set[ReasonKind]
     runs: Runs | None
 
 
@@ -55,18 +53,19 @@ class AlignmentStory:
         """
         for alignment in joint.alignments:
             pair = alignment.reference, alignment.other
-            found = objection(alignment)
-            if found is None:
+            status = alignment.status
+            if status is None or status.is_relied_on:
                 yield from self._relied_on_again(alignment)
                 if pair not in self._told:
                     yield from self._decided(alignment, None)
-            elif self._objections.get(pair, -1) != found.revoked:
-                self._objections[pair] = found.revoked
-                what = f"revoked in version {found.revoked}" if found.revoked else "not relied on"
-                yield f"{pair[0]} and {pair[1]}: alignment {what} ({found.reason})"
+            elif self._objections.get(pair, -1) != status.revoked_in:
+                revoked = self._objections[pair] = status.revoked_in
+                what = f"revoked in version {revoked}" if revoked else "not relied on"
+                why = tell_cause(alignment.cause, pair, status)
+                yield f"{pair[0]} and {pair[1]}: alignment {what} ({why})"
 
     def _decided(self, alignment: Alignment, runs: Runs | None) -> Iterator[str]:
-        pair, kind = (alignment.reference, alignment.other), gist(alignment.reason)
+        pair, kind = (alignment.reference, alignment.other), alignment.cause.kind
         before = self._told.get(pair)
         if before is not None and before.runs not in (None, runs):
             before = None
@@ -75,8 +74,8 @@ class AlignmentStory:
             yield _tell(alignment, before.decision if before else None)
             return
         before.runs = runs
-        if alignment.decision != "accepted" and kind not in before.gists:
-            before.gists.add(kind)
+        if alignment.decision != "accepted" and kind not in before.kinds:
+            before.kinds.add(kind)
             yield _tell(alignment, None)
 
     def _relied_on_again(self, alignment: Alignment) -> Iterator[str]:
@@ -85,11 +84,6 @@ class AlignmentStory:
             del self._objections[pair]
             if alignment.decision == "accepted":
                 yield f"{pair[0]} and {pair[1]}: alignment relied on again"
-
-
-def gist(reason: str) -> str:
-    """Return what a reason says at its end, where it differs in kind, whatever its numbers."""
-    return _NUMBER.sub("", reason.rpartition("; ")[2])
 
 
 def _tell(alignment: Alignment, before: Decision | None) -> str:

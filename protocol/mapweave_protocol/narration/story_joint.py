@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from mapweave.fusion.confidence import percent
 from mapweave.maps import JointComponent, JointMap
+from mapweave.text import percent
 
 Group: TypeAlias = frozenset[str]
 NOTABLE = 0.05  # change of a component's confidence that is worth a line

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from mapweave.maps import Alignment, Decision, RobotMap
+from mapweave.evidence import Evidence, RunnerUp
+from mapweave.maps import Alignment, Decision, RobotMap, parse_component
+from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave_protocol.wire.model import (
     MAX_ALIGNMENTS,
     ComponentName,
@@ -39,15 +41,60 @@ class MapVersion(WireModel):
         return cls(robot=robot_map.robot, boot=robot_map.boot, version=robot_map.version)
 
 
-class RunnerUp(WireModel):
+class WireRunnerUp(WireModel):
     """The best different hypothesis."""
 
     transform: Transform
     numbers: dict[Label, Number] = Field(max_length=MAX_EVIDENCE)
 
+    @classmethod
+    def pack(cls, runner_up: RunnerUp) -> Self:
+        """Return `runner_up` for the wire; what could not be measured is left out."""
+        transform = to_transform(runner_up.transform)
+        return cls(transform=transform, numbers=_measured(runner_up.by_name()))
+
+    def unpack(self) -> RunnerUp:
+        """Return the hypothesis."""
+        return RunnerUp.of(np.array(self.transform), self.numbers)
+
+
+class WireReason(WireModel):
+    """Why an alignment was decided as it was."""
+
+    kind: Annotated[ReasonKind, Field(strict=False)]  # on the wire it is its name
+    numbers: dict[Label, float] = Field(max_length=MAX_EVIDENCE)
+    text: Sentence = ""
+    found: "WireReason | None" = None
+
+    @classmethod
+    def pack(cls, reason: Reason) -> Self:
+        """Return `reason` for the wire."""
+        return cls(
+            kind=reason.kind,
+            numbers={name: float(number) for name, number in reason.numbers.items()},
+            text=reason.text,
+            found=None if reason.found is None else cls.pack(reason.found),
+        )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        self.unpack()
+        return self
+
+    def unpack(self) -> Reason:
+        """Return the reason.
+
+        Raises
+        ------
+        ValueError
+            If its numbers are not those of its kind.
+        """
+        found = None if self.found is None else self.found.unpack()
+        return Reason(self.kind, dict(self.numbers), found, self.text)
+
 
 class WireAlignment(WireModel):
-    """An alignment of two components."""
+    """An alignment of two components; without a cause, the reason is all that is known of it."""
 
     reference: ComponentName
     other: ComponentName
@@ -56,11 +103,18 @@ class WireAlignment(WireModel):
     confidence: Probability
     reason: Sentence
     evidence: dict[Label, Number] = Field(max_length=MAX_EVIDENCE)
-    runner_up: RunnerUp | None
+    runner_up: WireRunnerUp | None
+    status: Annotated[StatusKind | None, Field(strict=False)] = None
+    set_aside_by: tuple[tuple[ComponentName, ComponentName], ...] = Field(
+        default=(), max_length=MAX_ALIGNMENTS
+    )
+    revoked_in: Count | None = None
+    cause: WireReason | None = None
 
     @classmethod
     def pack(cls, alignment: Alignment) -> Self:
         """Return `alignment` for the wire; what could not be measured is left out."""
+        rival, status = alignment.runner_up, alignment.status
         return cls(
             reference=alignment.reference,
             other=alignment.other,
@@ -68,9 +122,18 @@ class WireAlignment(WireModel):
             decision=alignment.decision,
             confidence=float(alignment.confidence),
             reason=alignment.reason,
-            evidence=_measured(alignment.evidence),
-            runner_up=_pack_runner_up(alignment.runner_up),
+            evidence=_measured(alignment.evidence.by_name()),
+            runner_up=None if rival is None else WireRunnerUp.pack(rival),
+            status=None if status is None else status.kind,
+            set_aside_by=() if status is None else status.set_aside_by,
+            revoked_in=None if status is None else status.revoked_in,
+            cause=WireReason.pack(alignment.cause),
         )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        self._status()
+        return self
 
     def unpack(self) -> Alignment:
         """Return the alignment."""
@@ -80,31 +143,21 @@ class WireAlignment(WireModel):
             transform=np.array(self.transform),
             decision=self.decision,
             confidence=self.confidence,
-            reason=self.reason,
-            evidence=dict(self.evidence),
-            runner_up=_unpack_runner_up(self.runner_up),
+            cause=Reason.words(self.reason) if self.cause is None else self.cause.unpack(),
+            evidence=Evidence.of(self.evidence),
+            runner_up=None if self.runner_up is None else self.runner_up.unpack(),
+            status=self._status(),
         )
+
+    def _status(self) -> Status | None:
+        if self.status is None:
+            return None
+        return Status(self.status, self.set_aside_by, self.revoked_in)
 
 
 def _measured(numbers: Mapping[str, float]) -> dict[str, float]:
     """Return the finite ones of `numbers`; the residual of nothing, say, is none."""
     return {name: float(number) for name, number in numbers.items() if math.isfinite(number)}
-
-
-def _pack_runner_up(runner_up: Mapping[str, object] | None) -> RunnerUp | None:
-    if runner_up is None:
-        return None
-    # Its transform has three numbers, everything else in it is one number.
-    arrays = {name: np.asarray(value, dtype=float) for name, value in runner_up.items()}
-    transform = to_transform(arrays.pop("transform"))
-    numbers = _measured({name: float(array) for name, array in arrays.items()})
-    return RunnerUp(transform=transform, numbers=numbers)
-
-
-def _unpack_runner_up(runner_up: RunnerUp | None) -> dict[str, object] | None:
-    if runner_up is None:
-        return None
-    return {"transform": list(runner_up.transform), **runner_up.numbers}
 
 
 class AlignmentMessage(Message):
@@ -142,7 +195,7 @@ class AlignmentMessage(Message):
     @model_validator(mode="after")
     def _check(self) -> Self:
         for alignment in self.alignments:
-            robots = {alignment.reference.split("/")[0], alignment.other.split("/")[0]}
+            robots = {parse_component(n)[0] for n in (alignment.reference, alignment.other)}
             if not robots <= {self.reference.robot, self.other.robot}:
                 raise ValueError(f"{alignment.reference} and {alignment.other}: another pair")
         return self

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from mapweave.io.map_files import read_joint
+from mapweave.maps import parse_component
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.messages import JointMapMessage
@@ -120,6 +121,6 @@ def test_robots_in_two_buildings_end_in_two_components(tmp_path: Path, data_dir:
     logs = [str(data_dir / name) for name in ("intel.log.gz", "seattle.log.gz")]
     run = run_team(tmp_path, *logs, "--robots", "3")
     components = read_joint(run.folder / "joint.json").components
-    groups = [{name.partition("/")[0] for name in component.robots} for component in components]
+    groups = [{parse_component(name)[0] for name in component.robots} for component in components]
     assert sorted(groups, key=min) == [{"r1", "r2", "r3"}, {"r4", "r5", "r6"}]
     assert "WRONG" not in run.said

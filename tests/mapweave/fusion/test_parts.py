@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from mapweave.evidence import Evidence
 from mapweave.fusion.align import FusionParameters, align_robots
 from mapweave.fusion.parts import PartParameters, agreed, cut
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.reasons import Reason, ReasonKind
 from tests.mapweave.buildings import corridor, line_map, part
 
 P = PartParameters()
@@ -59,21 +61,24 @@ def test_maps_bent_against_each_other_are_joined_in_parts() -> None:
     parameters = FusionParameters(parts=PartParameters(length=24.0))
     (found,) = align_robots(robot("a", bent), robot("b", -bent), parameters)
     assert found.decision == "accepted"
-    assert "pairs of parts agree" in found.reason
-    assert found.evidence["parts"] >= 2
-    assert found.evidence["spread"] <= P.distance
-    assert {"place", "reach"} <= found.evidence.keys()  # judged for the wholes
+    assert found.cause.kind is ReasonKind.PARTS_AGREE
+    numbers = found.evidence.by_name()
+    assert numbers["parts"] >= 2
+    assert numbers["spread"] <= P.distance
+    assert {"place", "reach"} <= numbers.keys()  # judged for the wholes
 
 
 def test_maps_that_are_rigid_are_joined_as_wholes() -> None:
     (found,) = align_robots(robot("a", 0.0), robot("b", 0.0))
     assert found.decision == "accepted"
-    assert "parts" not in found.evidence
+    assert found.evidence.parts is None
 
 
 def alignment(x: float, turn: float, held: float) -> Alignment:
     transform = np.array([x, 0.0, turn])
-    return Alignment("a/0", "b/0", transform, "accepted", 0.9, "so", {"held": held})
+    return Alignment(
+        "a/0", "b/0", transform, "accepted", 0.9, Reason.words("so"), Evidence(held=held)
+    )
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mapweave.errors import FileError
+from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import read_any, read_joint, read_map, write_joint, write_map
 from mapweave.maps import (
     Alignment,
-    Decision,
     JointComponent,
     JointMap,
     LineMap,
@@ -26,6 +26,8 @@ from mapweave.maps import (
     Submap,
     Trajectory,
 )
+from mapweave.reasons import Reason, ReasonKind
+from tests.alignment_strategies import alignments
 
 MAP: dict[str, Any] = {
     "format": "mapweave/map/1",
@@ -55,8 +57,8 @@ JOINT: dict[str, Any] = {
             "confidence": 0.97,
             "decision": "accepted",
             "reason": "30 m of wall in common",
-            "evidence": {"matched": 30.5, "ratio": None},
-            "runner_up": {"transform": [0, 0, 0], "matched": 2.5, "reason": "it slid"},
+            "evidence": {"common": 30.5, "residual": None},
+            "runner_up": {"transform": [0, 0, 0], "distance": 7, "common": 2.5},
         }
     ],
     "components": [
@@ -66,6 +68,29 @@ JOINT: dict[str, Any] = {
             "polylines": [[[0, 0, 1, 0], [1, 0, 1, 2]], [[4, 4, 5, 5]]],
             "support": [[3, 4], [1]],
             "segment_confidence": [[0.5, 1], [0]],
+        }
+    ],
+}
+JUDGED: dict[str, Any] = {
+    "status": "revoked",
+    "set_aside_by": [["a/0", "c/0"], ["c/0", "b/0"]],
+    "revoked_in": 3,
+    "cause": {
+        "kind": "others_contradict",
+        "distance": 9.123456789,
+        "turn": 0.5,
+        "found": {"kind": "convincing", "common": 30.5, "contradicted": 0.25},
+    },
+}
+TYPED = {
+    **JOINT,
+    "alignments": [
+        {
+            **JOINT["alignments"][0],
+            **JUDGED,
+            "decision": "ambiguous",
+            "reason": "revoked in version 3: 9.1 m and 29° off what a/0-c/0 and c/0-b/0 say;"
+            " 30 m of wall in common, 0.2 m contradicted; nothing else fits",
         }
     ],
 }
@@ -129,22 +154,6 @@ def joint_components(draw: st.DrawFn) -> JointComponent:
     confidences = arrays(np.float64, len(lines.segments), elements=st.floats(0, 1))
     robots = {"a/0": draw(floats((3,))), "b/12": draw(floats((3,)))}
     return JointComponent(robots, draw(st.floats(0, 1)), lines, draw(confidences))
-
-
-@st.composite
-def alignments(draw: st.DrawFn) -> Alignment:
-    decision: Decision = draw(st.sampled_from(["accepted", "ambiguous", "refused"]))
-    runner_up = {"transform": [1.0, 2.0, 3.0], "score": draw(st.floats(-9, 9)), "why": "é\n"}
-    return Alignment(
-        reference="a/0",
-        other="b/3",
-        transform=draw(floats((3,))),
-        decision=decision,
-        confidence=draw(st.floats(0, 1)),
-        reason=draw(st.text(max_size=9)),
-        evidence={"matched": draw(st.floats(-99, 99) | st.just(np.nan))},
-        runner_up=draw(st.sampled_from([None, runner_up])),
-    )
 
 
 def assert_same(found: object, expected: object) -> None:
@@ -216,8 +225,11 @@ def test_a_robot_map_comes_back_as_it_was_written(robot_map: RobotMap, tmp_path:
 @given(joint=joint_maps())
 def test_a_joint_map_comes_back_as_it_was_written(joint: JointMap, tmp_path: Path) -> None:
     write_joint(tmp_path / "joint.json", joint)
-    assert_same(read_joint(tmp_path / "joint.json"), joint)
+    found = read_joint(tmp_path / "joint.json")
+    assert_same(found, joint)
     assert_same(read_any(tmp_path / "joint.json"), joint)
+    for one, other in zip(found.alignments, joint.alignments, strict=True):
+        assert (one.cause, one.status, one.reason) == (other.cause, other.status, other.reason)
 
 
 def test_a_map_file_has_the_published_fields(tmp_path: Path) -> None:
@@ -226,10 +238,45 @@ def test_a_map_file_has_the_published_fields(tmp_path: Path) -> None:
 
 
 def test_a_joint_map_file_has_the_published_fields_and_the_free_space(tmp_path: Path) -> None:
-    write_joint(tmp_path / "joint.json", read_joint(write(tmp_path, JOINT)))
+    write_joint(tmp_path / "joint.json", read_joint(write(tmp_path, TYPED)))
     assert json.loads((tmp_path / "joint.json").read_text()) == changed(
-        JOINT, ["components", 0, "free_space"], []
+        TYPED, ["components", 0, "free_space"], []
     )
+
+
+def test_a_file_from_before_causes_were_typed_keeps_its_sentence(tmp_path: Path) -> None:
+    write_joint(tmp_path / "joint.json", read_joint(write(tmp_path, JOINT)))
+    (found,) = json.loads((tmp_path / "joint.json").read_text())["alignments"]
+    assert found == {
+        **JOINT["alignments"][0],
+        "status": None,
+        "set_aside_by": [],
+        "revoked_in": None,
+        "cause": {"kind": "words", "text": "30 m of wall in common"},
+    }
+
+
+@pytest.mark.parametrize("steps", [["kind"], ["found", "kind"]])
+def test_of_a_cause_of_a_later_version_the_sentence_is_known(
+    steps: list[str], tmp_path: Path
+) -> None:
+    later = changed(TYPED, ["alignments", 0, "cause", *steps], "foreseen")
+    (found,) = read_joint(write(tmp_path, later)).alignments
+    assert found.reason == TYPED["alignments"][0]["reason"]
+    assert (found.cause.kind, found.status) == (ReasonKind.WORDS, None)
+
+
+@pytest.mark.parametrize(
+    "steps", [["evidence"], ["runner_up"], ["cause"], ["cause", "found"]], ids="/".join
+)
+def test_what_a_later_version_knows_of_an_alignment_is_ignored(
+    steps: list[str], tmp_path: Path
+) -> None:
+    for value in (0.5, None, "red", [1, 2], {"a": 1}):
+        later = changed(TYPED, ["alignments", 0, *steps, "colour"], value)
+        write_joint(tmp_path / "joint.json", read_joint(write(tmp_path, later)))
+        (found,) = json.loads((tmp_path / "joint.json").read_text())["alignments"]
+        assert found == TYPED["alignments"][0]
 
 
 def test_numbers_are_written_no_finer_than_they_mean(tmp_path: Path) -> None:
@@ -241,13 +288,17 @@ def test_numbers_are_written_no_finer_than_they_mean(tmp_path: Path) -> None:
 def test_what_is_not_finite_is_written_as_null(tmp_path: Path) -> None:
     """An infinite ratio in the evidence must not make a file that no other program reads."""
     alignment = Alignment(
-        "a/0", "b/0", np.zeros(3), "refused", 0.0, "", {"ratio": np.inf},
-        {"transform": np.zeros(3), "ratio": np.float64(np.nan)},
+        "a/0", "b/0", np.zeros(3), "refused", 0.0,
+        Reason(ReasonKind.LITTLE_COMMON, {"common": np.inf}), Evidence(residual=np.inf),
+        RunnerUp(np.zeros(3), distance=np.float64(np.nan)),
     )  # fmt: skip
     write_joint(tmp_path / "joint.json", JointMap(1, (), (alignment,)))
     (found,) = json.loads((tmp_path / "joint.json").read_text())["alignments"]
-    assert found["evidence"] == {"ratio": None}
-    assert found["runner_up"] == {"transform": [0, 0, 0], "ratio": None}
+    assert found["evidence"] == {"residual": None}
+    assert found["runner_up"] == {"transform": [0, 0, 0], "distance": None}
+    assert found["cause"] == {"kind": "little_common", "common": None}
+    (read,) = read_joint(tmp_path / "joint.json").alignments
+    assert np.isnan(read.cause.numbers["common"])
 
 
 @pytest.mark.parametrize("content", [MAP, JOINT], ids=["map", "joint"])
@@ -305,7 +356,18 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
         (JOINT, ["alignments", 0, "decision"], "maybe", "alignments[0].decision", "'refused'"),
         (JOINT, ["alignments", 0, "confidence"], 1.5, "alignments[0].confidence", "equal to 1"),
         (JOINT, ["alignments", 0, "other"], "b", "alignments[0].other", "pattern"),
-        (JOINT, ["alignments", 0, "runner_up", "x"], float("nan"), "alignments[0].runner_up.x", ""),
+        (JOINT, ["alignments", 0, "runner_up", "turn"], float("nan"),
+         "alignments[0].runner_up.turn", "finite number"),
+        (JOINT, ["alignments", 0, "evidence", "held"], "1", "alignments[0].evidence.held", "valid"),
+        (TYPED, ["alignments", 0, "status"], "lost", "alignments[0].status", "'relied_on'"),
+        (TYPED, ["alignments", 0, "status"], "held", "alignments[0]", "expected a version if"),
+        (TYPED, ["alignments", 0, "revoked_in"], None, "alignments[0]", "expected a version if"),
+        (TYPED, ["alignments", 0, "set_aside_by", 0], ["a/0"], "alignments[0].set_aside_by[0][1]",
+         "required"),
+        (TYPED, ["alignments", 0, "cause", "kind"], "rival", "alignments[0].cause",
+         "reason rival: expected"),
+        (TYPED, ["alignments", 0, "cause", "distance"], "9", "alignments[0].cause",
+         "expected distance, turn"),
         (JOINT, ["components", 0, "robots"], {}, "components[0].robots", "at least 1 item"),
         (JOINT, ["components", 0, "robots"], {"a\n": [0] * 3}, "components[0].robots['a\\n']", ""),
         (JOINT, ["components", 0, "segment_confidence"], [[1], [1]], "components[0]",

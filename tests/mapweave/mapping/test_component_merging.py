@@ -17,6 +17,7 @@ from mapweave.mapping.component_merging import (
 )
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.matching.verification import Verdict
+from mapweave.reasons import Reason
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, corridor, part, random_pose, shaken
 
 
@@ -109,7 +110,7 @@ def test_a_pair_that_was_refused_is_compared_again_when_a_part_of_one_has_left_i
 
     def refuse(*names: object) -> Alignment:
         compared.append(str(names[0]))
-        return Alignment("older", "younger", np.zeros(3), "refused", 0.0, "so")
+        return Alignment("older", "younger", np.zeros(3), "refused", 0.0, Reason.words("so"))
 
     monkeypatch.setattr("mapweave.mapping.component_merging.compare", refuse)
     good, wrong = submap(0, 0, np.zeros(3), parts[0]), submap(1, 0, np.zeros(3), parts[1])
@@ -177,7 +178,7 @@ def test_where_track_was_lost_less_proof_is_asked_for_than_anywhere(
         a: str, _: object, b: str, __: object, p: FusionParameters, possible: object = None
     ) -> Alignment:
         asked.append((possible is not None, p.decision.min_confidence, p.decision.min_lead))
-        return Alignment(a, b, np.zeros(3), "ambiguous", 0.0, "so")
+        return Alignment(a, b, np.zeros(3), "ambiguous", 0.0, Reason.words("so"))
 
     monkeypatch.setattr("mapweave.mapping.component_merging.compare", refuse)
     parts = [shaken(part(TWINS, 8, 40), rng), shaken(part(TWINS, 12, 22), rng)]

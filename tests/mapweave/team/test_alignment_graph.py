@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
+from mapweave.evidence import Evidence
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, Decision, LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster, cluster_components
 from tests.mapweave.buildings import BUILDING, part, random_pose
 
 P = AlignmentGraphParameters()
+FOUND = Reason.words("30 m of wall in common")
+DECISIONS: tuple[Decision, ...] = "accepted", "ambiguous", "refused"
 NAMES = ["a/0", "b/0", "c/0", "d/0"]
 TRUE = {name: random_pose(np.random.default_rng(k), 10) for k, name in enumerate([*NAMES, "e/0"])}
 
@@ -30,9 +34,7 @@ def link(
 ) -> Alignment:
     """Return the alignment of two components by their true poses, off by `error` (3,)."""
     true = se2.between(TRUE[reference], TRUE[other])
-    return Alignment(
-        reference, other, se2.compose(true, error), decision, confidence, "30 m of wall in common"
-    )
+    return Alignment(reference, other, se2.compose(true, error), decision, confidence, FOUND)
 
 
 def assert_true_poses(cluster: Cluster, tolerance: float = 1e-6) -> None:
@@ -68,12 +70,12 @@ def test_a_cluster_is_as_sure_as_the_weakest_link_it_needs() -> None:
 def test_bent_maps_make_a_component_less_sure_and_their_places_decide_what_is_relied_on() -> None:
     """Two that agree about the place outweigh a third, however little each is sure of the rest."""
     circle = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
-    links = [replace(link(*pair, 0.3), evidence={"place": 0.97}) for pair in circle]
+    links = [replace(link(*pair, 0.3), evidence=Evidence(place=0.97)) for pair in circle]
     for count in (2, 3):  # a circle proves the places, and tells nothing of the bends
         (bent,), judged = cluster_components(NAMES[:3], links[:count], P)
         assert bent.confidence == pytest.approx(0.3, abs=0.01)
         assert [a.confidence for a in judged] == [0.3] * count
-    lonely = replace(link(*circle[2], 0.6, error=(9, 0, 0)), evidence={"place": 0.6})
+    lonely = replace(link(*circle[2], 0.6, error=(9, 0, 0)), evidence=Evidence(place=0.6))
     _, judged = cluster_components(NAMES[:3], [*links[:2], lonely], P)
     assert [a.decision for a in judged] == ["accepted", "accepted", "ambiguous"]
 
@@ -81,7 +83,7 @@ def test_bent_maps_make_a_component_less_sure_and_their_places_decide_what_is_re
 @pytest.mark.parametrize(("reach", "joined"), [(0.0, False), (40.0, True), (1e9, True)])
 def test_a_circle_of_bent_maps_may_miss_by_what_they_are_bent(reach: float, joined: bool) -> None:
     pairs = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
-    evidence = {"place": 0.97, "reach": reach}
+    evidence = Evidence(place=0.97, reach=reach)
     links = [replace(link(*pair, 0.9), evidence=evidence) for pair in pairs[:2]]
     off = replace(link(*pairs[2], 0.9, error=(1.4, 0, 0)), evidence=evidence)
     _, judged = cluster_components(NAMES[:3], [*links, off], P)
@@ -89,7 +91,7 @@ def test_a_circle_of_bent_maps_may_miss_by_what_they_are_bent(reach: float, join
 
 
 def test_no_reach_excuses_another_place() -> None:
-    evidence = {"place": 0.97, "reach": 1e300}
+    evidence = Evidence(place=0.97, reach=1e300)
     pairs = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
     links = [replace(link(*pair, 0.9), evidence=evidence) for pair in pairs[:2]]
     off = replace(link(*pairs[2], 0.9, error=(9.0, 0, 0)), evidence=evidence)
@@ -100,9 +102,10 @@ def test_no_reach_excuses_another_place() -> None:
 def test_the_way_around_a_bent_map_counts() -> None:
     """Of two ways to a component the one that is less bent tells how sure it is."""
     sure = [
-        replace(link(*p, 0.9), evidence={"place": 0.9}) for p in (("a/0", "b/0"), ("b/0", "c/0"))
+        replace(link(*p, 0.9), evidence=Evidence(place=0.9))
+        for p in (("a/0", "b/0"), ("b/0", "c/0"))
     ]
-    bent = replace(link("a/0", "c/0", 0.2), evidence={"place": 0.9})
+    bent = replace(link("a/0", "c/0", 0.2), evidence=Evidence(place=0.9))
     (cluster,), _ = cluster_components(NAMES[:3], [*sure, bent], P)
     assert cluster.confidence > 0.9
 
@@ -110,17 +113,17 @@ def test_the_way_around_a_bent_map_counts() -> None:
 @pytest.mark.parametrize("away", range(4))
 def test_poses_follow_exact_links_where_a_bent_one_misses(away: int) -> None:
     pairs = [("a/0", "b/0"), ("b/0", "c/0"), ("a/0", "c/0")]
-    exact = {"place": 0.97, "reach": 0.0}
+    exact = Evidence(place=0.97, reach=0.0)
     links = [replace(link(*pair, 0.95), evidence=exact) for pair in pairs[:2]]
     error = [np.cos(away * np.pi / 2), np.sin(away * np.pi / 2), 0.0]
-    off = replace(link(*pairs[2], 0.3, error=error), evidence={"place": 0.97, "reach": 50.0})
+    off = replace(link(*pairs[2], 0.3, error=error), evidence=Evidence(place=0.97, reach=50.0))
     (cluster,), _ = cluster_components(NAMES[:3], [*links, off], P)
     assert_true_poses(cluster, 0.15)
 
 
 @pytest.mark.parametrize("place", [-1e9, 0.0, 1e9, np.nan])
 def test_a_place_that_is_no_probability_breaks_nothing(place: float) -> None:
-    odd = replace(CHAIN[0], evidence={"place": place})
+    odd = replace(CHAIN[0], evidence=Evidence(place=place))
     (cluster,), _ = cluster_components(NAMES[:2], [odd], P)
     assert 0 <= cluster.confidence <= 1
 
@@ -132,7 +135,8 @@ def test_components_without_an_accepted_link_stay_alone_and_sure() -> None:
     assert [list(c.poses) for c in clusters] == [["a/0", "b/0"], ["c/0"], ["d/0"]]
     assert clusters[1].confidence == 1.0
     np.testing.assert_array_equal(clusters[1].poses["c/0"], np.zeros(3))
-    assert list(judged) == links
+    assert [a.status for a in judged] == [Status(StatusKind.RELIED_ON), None, None]
+    assert [(a.decision, a.cause) for a in judged] == [(a.decision, a.cause) for a in links]
 
 
 @pytest.mark.parametrize("error", [[1.0, 0, 0], [0, 0, 0.15], [-7, 3, 2.0]])
@@ -152,6 +156,10 @@ def test_a_link_that_contradicts_a_circle_is_set_aside_and_named(error: list[flo
         f"set aside: {off:.1f} m and {turn:.0f}° off what a/0-b/0, c/0-b/0 and c/0-d/0 say;"
         " 30 m of wall in common"
     )
+    by = ("a/0", "b/0"), ("c/0", "b/0"), ("c/0", "d/0")
+    assert aside.status == Status(StatusKind.SET_ASIDE, by)
+    assert aside.cause.kind is ReasonKind.OTHERS_CONTRADICT
+    assert aside.cause.found == FOUND
     np.testing.assert_array_equal(aside.transform, wrong.transform)
 
 
@@ -204,7 +212,7 @@ def random_team(rng: Generator) -> Team:
     def align(pair: tuple[int, int], error: FloatArray, confidence: float) -> Alignment:
         a, b = (names[k] for k in pair)
         transform = se2.compose(se2.between(poses[a], poses[b]), error)
-        return Alignment(a, b, transform, "accepted", confidence, "30 m of wall in common")
+        return Alignment(a, b, transform, "accepted", confidence, FOUND)
 
     links = [
         align(pair, rng.normal(0, [0.05, 0.05, 0.005]), rng.uniform(0.7, 0.97)) for pair in pairs
@@ -221,7 +229,7 @@ def test_one_wrong_alignment_the_surest_of_all_is_set_aside_and_named(seed: int)
     (without,), _ = cluster_components(team.names, team.links, P)
     (cluster,), judged = cluster_components(team.names, [team.wrong, *team.links], P)
     assert [a.decision for a in judged] == ["ambiguous"] + ["accepted"] * len(team.links)
-    assert judged[0].reason.startswith("set aside: ")
+    assert judged[0].status is not None and judged[0].status.kind is StatusKind.SET_ASIDE
     assert judged[0].confidence < 0.5
     assert_same_poses(dict(cluster.poses), dict(without.poses))
     first = team.poses[team.names[0]]
@@ -281,7 +289,7 @@ def test_one_more_robot_joins_two_clusters() -> None:
 def test_two_alignments_of_one_pair_that_agree_are_surer_than_one() -> None:
     twice = [link("a/0", "b/0", 0.8), link("b/0", "a/0", 0.7)]
     (cluster,), judged = cluster_components(["a/0", "b/0"], twice, P)
-    assert list(judged) == twice
+    assert [(a.decision, a.confidence) for a in judged] == [("accepted", 0.8), ("accepted", 0.7)]
     assert cluster.confidence > 0.99
 
 
@@ -290,9 +298,28 @@ def test_three_that_contradict_each_other_alike_join_no_three() -> None:
     clusters, judged = cluster_components(["a/0", "b/0", "c/0"], links, P)
     assert [len(c.poses) for c in clusters] == [2, 1]
     assert clusters[0].confidence < 0.7
-    aside = [a.reason for a in judged if a.decision == "ambiguous"]
-    assert len(aside) == 2
-    assert all("nothing tells for sure which is wrong" in reason for reason in aside)
+    aside = [a for a in judged if a.decision == "ambiguous"]
+    assert [a.status for a in aside] == [Status(StatusKind.SET_ASIDE)] * 2
+    assert [a.cause for a in aside] == [Reason(ReasonKind.UNDECIDED, found=FOUND)] * 2
+    assert all("nothing tells for sure which is wrong" in a.reason for a in aside)
+
+
+def test_what_is_relied_on_only_because_the_robots_met_before_is_held() -> None:
+    kept = replace(CHAIN[0], cause=Reason(ReasonKind.MET_BEFORE, found=FOUND))
+    _, judged = cluster_components(NAMES, [kept, *CHAIN[1:]], P)
+    assert [a.status for a in judged] == [
+        Status(StatusKind.HELD),
+        Status(StatusKind.RELIED_ON),
+        Status(StatusKind.RELIED_ON),
+    ]
+
+
+def test_what_others_say_became_of_an_alignment_is_not_believed() -> None:
+    """A joint map judges for itself."""
+    said = Status(StatusKind.REVOKED, revoked_in=7)
+    links = [replace(link("a/0", "b/0", decision=d), status=said) for d in DECISIONS]
+    _, judged = cluster_components(NAMES, links, P)
+    assert [a.status for a in judged] == [Status(StatusKind.RELIED_ON), None, None]
 
 
 def test_the_largest_cluster_comes_first() -> None:

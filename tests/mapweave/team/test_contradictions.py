@@ -9,6 +9,7 @@ from numpy.random import Generator
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, JointMap, LineMap
+from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave.team.joint_map import build_joint_map
 from tests.mapweave.buildings import BUILDING, line_map, part, random_pose, shaken
 
@@ -20,7 +21,9 @@ ELSEWHERE = np.array([-15.0, 0.4, 0.0])  # puts the right part over the left one
 
 
 def link(reference: str, other: str, transform: FloatArray, confidence: float) -> Alignment:
-    return Alignment(reference, other, transform, "accepted", confidence, "20 m in common")
+    return Alignment(
+        reference, other, transform, "accepted", confidence, Reason.words("20 m in common")
+    )
 
 
 def joined_by_way_of_the_middle(transform: FloatArray, *, left: float, right: float) -> JointMap:
@@ -37,10 +40,14 @@ def test_maps_that_fit_each_other_where_nobody_compared_them_change_nothing() ->
 def test_walls_where_a_third_robot_saw_through_part_the_weakest_link_between() -> None:
     joint = joined_by_way_of_the_middle(ELSEWHERE, left=0.98, right=0.8)
     assert [list(c.robots) for c in joint.components] == [["a/0", "b/0"], ["c/0"]]
-    kept, revoked = joint.alignments
-    assert (kept.decision, revoked.decision) == ("accepted", "ambiguous")
-    assert revoked.reason.startswith("set aside: a/0 and c/0 would have ")
-    assert "m of wall where the other saw free space" in revoked.reason
+    kept, aside = joint.alignments
+    assert (kept.decision, aside.decision) == ("accepted", "ambiguous")
+    assert kept.status == Status(StatusKind.RELIED_ON)
+    assert aside.status == Status(StatusKind.SET_ASIDE, (("a/0", "c/0"),))
+    assert aside.cause.kind is ReasonKind.MAPS_CONTRADICT
+    assert aside.cause.found == Reason.words("20 m in common")
+    assert aside.reason.startswith("set aside: a/0 and c/0 would have ")
+    assert "m of wall where the other saw free space" in aside.reason
     # The other one may be the wrong one: odds 49 to 4, and its own 49 to 1.
     assert joint.components[0].confidence == pytest.approx(1 / (1 + 4 / 49 + 1 / 49), abs=0.002)
 
@@ -49,7 +56,8 @@ def test_two_links_as_sure_as_each_other_are_both_parted() -> None:
     joint = joined_by_way_of_the_middle(ELSEWHERE, left=0.9, right=0.9)
     assert [list(c.robots) for c in joint.components] == [["a/0"], ["b/0"], ["c/0"]]
     for alignment in joint.alignments:
-        assert alignment.reason.startswith("set aside: a/0 and c/0 would have ")
+        assert alignment.status == Status(StatusKind.SET_ASIDE, (("a/0", "c/0"),))
+        assert alignment.cause.kind is ReasonKind.MAPS_CONTRADICT_JOINTLY
         assert "by this alignment or another one between them" in alignment.reason
         assert alignment.confidence == pytest.approx(0.5, abs=0.01)
 

@@ -9,6 +9,7 @@ from shapely.geometry import Polygon
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap
+from mapweave.reasons import Reason
 from mapweave.scan.free_space import from_rings
 from mapweave.team.joint_map import build_joint_map
 from tests.mapweave.buildings import (
@@ -28,7 +29,9 @@ LEFT, RIGHT = part(BUILDING, 0, 18), part(BUILDING, 8, 30)
 
 
 def link(reference: str, other: str, transform: FloatArray, confidence: float = 0.9) -> Alignment:
-    return Alignment(reference, other, transform, "accepted", confidence, "30 m of wall in common")
+    return Alignment(
+        reference, other, transform, "accepted", confidence, Reason.words("30 m of wall in common")
+    )
 
 
 def wall_of(lines: LineMap) -> float:
@@ -90,7 +93,9 @@ def test_the_shape_does_not_depend_on_the_robots_frames(rng: Generator) -> None:
 
 
 def test_what_is_not_joined_stays_a_component_of_its_own() -> None:
-    refused = Alignment("a/0", "b/0", np.zeros(3), "refused", 0.1, "only 2 m of wall in common")
+    refused = Alignment(
+        "a/0", "b/0", np.zeros(3), "refused", 0.1, Reason.words("only 2 m of wall in common")
+    )
     joint = build_joint_map({"a/0": LEFT, "b/0": RIGHT}, [refused], 1)
     assert [list(c.robots) for c in joint.components] == [["a/0"], ["b/0"]]
     assert joint.alignments == (refused,)

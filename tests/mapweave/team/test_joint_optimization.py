@@ -10,6 +10,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.loop_closing import LoopCloser
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.reasons import Reason
 from mapweave.team.alignment_graph import Cluster
 from mapweave.team.joint_map import build_team_map
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
@@ -43,7 +44,7 @@ def team(
     robots = {"a/0": submaps(bend, frames[0]), "b/0": submaps(-bend, frames[1])}
     there, here = (robot[4].pose for robot in robots.values())
     transform = se2.compose(there, se2.inverse(here))
-    alignment = Alignment("a/0", "b/0", transform, "accepted", 0.99, "so")
+    alignment = Alignment("a/0", "b/0", transform, "accepted", 0.99, Reason.words("so"))
     return Cluster({"a/0": np.zeros(3), "b/0": transform}, 0.99), robots, [alignment]
 
 
@@ -138,8 +139,8 @@ def test_three_robots_and_one_that_saw_nothing_are_woven(frames: FloatArray) -> 
     there = se2.compose(robots["a/0"][4].pose, se2.inverse(third[4].pose))
     links = [
         *alignments,
-        Alignment("a/0", "c/0", there, "accepted", 0.99, "so"),
-        Alignment("a/0", "d/0", there, "accepted", 0.99, "so"),
+        Alignment("a/0", "c/0", there, "accepted", 0.99, Reason.words("so")),
+        Alignment("a/0", "d/0", there, "accepted", 0.99, Reason.words("so")),
     ]
     poses = {**cluster.poses, "c/0": there, "d/0": there}
     woven, lines = WHOLE.weave(Cluster(poses, 0.99), everyone, links)

@@ -8,6 +8,7 @@ from numpy.random import Generator
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.reasons import Reason, ReasonKind
 from mapweave.team.rebase import Change, carry, places_of
 from tests.mapweave.buildings import line_map, random_pose, rectangle, walls_of
 
@@ -34,7 +35,7 @@ def still(robot_map: RobotMap) -> Change:
 
 
 def alignment(transform: FloatArray) -> Alignment:
-    return Alignment("a/0", "b/0", transform, "accepted", 0.9, "20 m in common")
+    return Alignment("a/0", "b/0", transform, "accepted", 0.9, Reason.words("20 m in common"))
 
 
 A = robot("a", np.zeros(3), np.array([20.0, 0, 0.2]))
@@ -94,7 +95,7 @@ def test_what_was_found_on_a_submap_that_left_its_component_is_open_again() -> N
     gone = replace(B, submaps=(B.submaps[0], replace(B.submaps[1], component=1)))
     carried = carry(alignment(FOUND), still(A), Change(places_of(B), gone))
     assert carried.decision == "ambiguous"
-    assert "another component" in carried.reason
+    assert carried.cause.kind is ReasonKind.REBASED
     refused = replace(alignment(FOUND), decision="refused")
     assert carry(refused, still(A), Change(places_of(B), gone)) is refused
     here = se2.compose(A.submaps[0].pose, se2.inverse(B.submaps[0].pose))

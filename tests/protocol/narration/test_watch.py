@@ -13,6 +13,7 @@ import pytest
 import zenoh
 
 from mapweave.maps import Alignment, Decision, JointMap, RobotMap
+from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.link.session import (
     declare_joint_publisher,
@@ -38,7 +39,9 @@ MAPWEAVE = Path(sys.executable).with_name("mapweave")
 
 def decided(decision: Decision) -> AlignmentMessage:
     a, b = (MapVersion(robot=robot, boot="x", version=1) for robot in "ab")
-    alignment = Alignment("a/0", "b/0", np.zeros(3), decision, 0.5, "look-alike corridors")
+    alignment = Alignment(
+        "a/0", "b/0", np.zeros(3), decision, 0.5, Reason.words("look-alike corridors")
+    )
     return AlignmentMessage.pack("a", a, b, [alignment])
 
 
@@ -101,22 +104,21 @@ def test_a_version_of_the_joint_map_is_told_once_with_its_components(
 
 def test_a_join_that_a_version_does_not_rely_on_is_told_once_with_the_reason() -> None:
     story = Story()
-    aside, revoked = "set aside: 9 m off what a/0-c/0 says", "revoked in version 3: only 2 m"
+    found = Reason.words("40 m in common")
+    off = Reason(ReasonKind.OTHERS_CONTRADICT, {"distance": 9.0, "turn": 0.0}, found)
+    little = Reason(ReasonKind.LITTLE_COMMON, {"common": 2.0})
+    plain = Alignment("a/0", "b/0", np.zeros(3), "ambiguous", 0.9, off)
+    aside = replace(plain, status=Status(StatusKind.SET_ASIDE, (("a/0", "c/0"),)))
+    revoked = replace(plain, cause=little, status=Status(StatusKind.REVOKED, revoked_in=3))
     lines = [
         line
-        for version, reason in enumerate([aside, aside, revoked, revoked], start=1)
-        for line in story.joined(
-            JointMap(
-                version,
-                (),
-                (Alignment("a/0", "b/0", np.zeros(3), "ambiguous", 0.9, reason),),
-            )
-        )
+        for version, alignment in enumerate([aside, aside, revoked, revoked], start=1)
+        for line in story.joined(JointMap(version, (), (alignment,)))
         if not line.startswith("joint map")
     ]
     assert lines == [
-        "a/0 and b/0: alignment not relied on (9 m off what a/0-c/0 says)",
-        "a/0 and b/0: alignment revoked in version 3 (only 2 m)",
+        "a/0 and b/0: alignment not relied on (9.0 m and 0° off what a/0-c/0 says; 40 m in common)",
+        "a/0 and b/0: alignment revoked in version 3 (only 2.0 m of wall in common)",
     ]
 
 

@@ -1,7 +1,6 @@
 """The story of a team, as a person in charge reads it: what matters, once, with the reason."""
 
 import numpy as np
-import pytest
 
 from mapweave.maps import (
     Alignment,
@@ -13,8 +12,8 @@ from mapweave.maps import (
     Submap,
     Trajectory,
 )
+from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave_protocol.narration.story import Story
-from mapweave_protocol.narration.story_alignments import gist
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 
 
@@ -27,10 +26,10 @@ def robot_map(*components: int, boot: str = "x") -> RobotMap:
     return RobotMap("a", boot, len(submaps), submaps)
 
 
-def found(decision: Decision, reason: str, boot: str = "x", of: str = "a/0") -> AlignmentMessage:
+def found(decision: Decision, cause: Reason, boot: str = "x", of: str = "a/0") -> AlignmentMessage:
     """Return what was found about robots a and b."""
     a, b = MapVersion(robot="a", boot=boot, version=1), MapVersion(robot="b", boot="y", version=1)
-    alignment = Alignment(of, "b/0", np.zeros(3), decision, 0.9, reason)
+    alignment = Alignment(of, "b/0", np.zeros(3), decision, 0.9, cause)
     return AlignmentMessage.pack("a", a, b, [alignment])
 
 
@@ -48,9 +47,23 @@ def joint(version: int, *groups: str, sure: float = 0.9) -> JointMap:
     return JointMap(version, tuple(components), ())
 
 
-def judged(version: int, decision: Decision, reason: str) -> JointMap:
+def judged(
+    version: int, decision: Decision, cause: Reason, status: Status | None = None
+) -> JointMap:
     """Return a version with an alignment of a and b."""
-    return JointMap(version, (), (Alignment("a/0", "b/0", np.zeros(3), decision, 0.9, reason),))
+    alignment = Alignment("a/0", "b/0", np.zeros(3), decision, 0.9, cause, status=status)
+    return JointMap(version, (), (alignment,))
+
+
+def little(common: float) -> Reason:
+    return Reason(ReasonKind.LITTLE_COMMON, {"common": common})
+
+
+def match(kind: ReasonKind, common: float, contradicted: float = 0.0, **others: float) -> Reason:
+    return Reason(kind, {"common": common, "contradicted": contradicted, **others})
+
+
+RIVAL = {"distance": 7.0, "turn": 0.0, "rival_common": 3.0, "rival_contradicted": 0.0}
 
 
 def told(story: Story, *joints: JointMap) -> list[str]:
@@ -89,10 +102,10 @@ def test_a_refusal_is_told_once_however_its_figures_change() -> None:
     story = Story()
     lines = decided(
         story,
-        found("refused", "only 2.1 m of wall in common"),
-        found("refused", "only 3.4 m of wall in common"),
-        found("refused", "40 m of wall in common, but 12 m of wall where the other saw free space"),
-        found("refused", "only 5.0 m of wall in common"),
+        found("refused", little(2.1)),
+        found("refused", little(3.4)),
+        found("refused", match(ReasonKind.CONTRADICTED, 40, 12)),
+        found("refused", little(5)),
     )
     assert lines == [
         "a/0 and b/0: refused (only 2.1 m of wall in common)",
@@ -105,10 +118,10 @@ def test_a_join_is_told_when_it_comes_and_when_it_goes_not_when_its_evidence_gro
     story = Story()
     lines = decided(
         story,
-        found("refused", "only 2.1 m of wall in common"),
-        found("accepted", "33 m of wall in common; nothing else fits"),
-        found("accepted", "51 m of wall in common; next best, 7 m away, has 3 m"),
-        found("ambiguous", "51 m of wall in common; but 9 m away fits as well"),
+        found("refused", little(2.1)),
+        found("accepted", match(ReasonKind.CONVINCING, 33)),
+        found("accepted", match(ReasonKind.CONVINCING, 51, **RIVAL)),
+        found("ambiguous", match(ReasonKind.RIVAL, 51, **RIVAL)),
     )
     assert [line.partition(" (")[0] for line in lines] == [
         "a/0 and b/0: refused",
@@ -121,31 +134,32 @@ def test_what_was_found_of_a_part_that_became_one_with_another_is_not_told() -> 
     story = Story()
     for map_ in (robot_map(0), robot_map(0, 1)):
         list(story.mapped(map_))
-    part = found("refused", "only 2.1 m of wall in common", of="a/1")
+    part = found("refused", little(2.1), of="a/1")
     assert len(decided(story, part)) == 1
     list(story.mapped(robot_map(0, 0, 0)))
-    assert decided(story, found("accepted", "40 m of wall in common", of="a/1")) == []
-    assert len(decided(story, found("accepted", "40 m of wall in common"))) == 1
+    assert decided(story, found("accepted", match(ReasonKind.CONVINCING, 40), of="a/1")) == []
+    assert len(decided(story, found("accepted", match(ReasonKind.CONVINCING, 40)))) == 1
 
 
 def test_what_is_found_of_another_run_is_news() -> None:
     story = Story()
-    one, next_one = (found("refused", "only 2.1 m", boot=boot) for boot in "xz")
+    one, next_one = (found("refused", little(2.1), boot=boot) for boot in "xz")
     assert len(decided(story, one, one, next_one, next_one)) == 2
 
 
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        ("only 2.1 m of wall in common", "only 13 m of wall in common"),
-        (
-            "8 m of wall in common; nothing else fits; too little to be sure (61%)",
-            "10 m in common; next best, 7 m away, has 1 m; too little to be sure (78%)",
-        ),
-    ],
-)
-def test_reasons_of_one_kind_have_one_gist(one: str, other: str) -> None:
-    assert gist(one) == gist(other)
+def test_a_reason_of_the_same_kind_is_told_once_whatever_its_numbers() -> None:
+    story = Story()
+    lines = decided(
+        story,
+        found("ambiguous", match(ReasonKind.UNSURE, 8, confidence=0.61)),
+        found("ambiguous", match(ReasonKind.UNSURE, 10, confidence=0.78, **RIVAL)),
+        found("ambiguous", match(ReasonKind.PARALLEL, 10)),
+        found("ambiguous", match(ReasonKind.UNSURE, 9, confidence=0.7)),
+    )
+    assert [line.rpartition("; ")[2] for line in lines] == [
+        "too little to be sure of the place (61%))",
+        "nearly all of it parallel, so one may slide along the other)",
+    ]
 
 
 def test_versions_that_change_neither_who_is_together_nor_how_surely_are_not_told() -> None:
@@ -195,19 +209,28 @@ def test_a_confidence_that_moved_since_it_was_told_is_told_with_what_it_was() ->
 
 def test_an_alignment_relied_on_again_is_told() -> None:
     story = Story()
-
-    def judged(version: int, decision: Decision, reason: str) -> JointMap:
-        return JointMap(version, (), (Alignment("a/0", "b/0", np.zeros(3), decision, 0.9, reason),))
-
-    told(story, judged(1, "ambiguous", "set aside: 9 m off what a/0-c/0 says"))
-    decided(story, found("accepted", "33 m of wall in common"))
-    lines = told(story, *(judged(n, "accepted", "33 m of wall in common") for n in (2, 3)))
+    convincing = match(ReasonKind.CONVINCING, 33)
+    aside = Reason(ReasonKind.UNDECIDED, found=convincing)
+    told(story, judged(1, "ambiguous", aside, Status(StatusKind.SET_ASIDE)))
+    decided(story, found("accepted", convincing))
+    relied_on = Status(StatusKind.RELIED_ON)
+    lines = told(story, *(judged(n, "accepted", convincing, relied_on) for n in (2, 3)))
     assert lines == ["a/0 and b/0: alignment relied on again"]
+
+
+def test_a_join_that_is_held_because_the_robots_met_before_is_relied_on() -> None:
+    story = Story()
+    cause = Reason(ReasonKind.MET_BEFORE, found=match(ReasonKind.CONVINCING, 33))
+    lines = told(story, *(judged(n, "accepted", cause, Status(StatusKind.HELD)) for n in (1, 2)))
+    assert lines[1:] == [
+        "a/0 and b/0: accepted, confidence 90% (the robots met before;"
+        " 33 m of wall in common, 0.0 m contradicted; nothing else fits)"
+    ]
 
 
 def test_who_comes_late_hears_the_reasons_from_the_joint_map_once() -> None:
     story = Story()
-    late = told(story, judged(7, "refused", "only 2.1 m"), judged(8, "refused", "only 2.2 m"))
-    assert late[1:] == ["a/0 and b/0: refused (only 2.1 m)"]
-    assert decided(story, found("refused", "only 2.3 m")) == []
-    assert len(decided(story, found("refused", "only 2.3 m", boot="z"))) == 1
+    late = told(story, judged(7, "refused", little(2.1)), judged(8, "refused", little(2.2)))
+    assert late[1:] == ["a/0 and b/0: refused (only 2.1 m of wall in common)"]
+    assert decided(story, found("refused", little(2.3))) == []
+    assert len(decided(story, found("refused", little(2.3), boot="z"))) == 1

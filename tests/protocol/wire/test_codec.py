@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry import se2
 from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap, Trajectory
+from mapweave.reasons import Reason, ReasonKind
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.codec import MAX_BODY, decode, encode
 from mapweave_protocol.wire.geometry import PackedLines
@@ -23,6 +25,7 @@ from mapweave_protocol.wire.messages import (
     Traffic,
 )
 from mapweave_protocol.wire.model import Message
+from tests.alignment_strategies import alignments as some_alignments
 
 MakeMap = Callable[..., RobotMap]
 MakeJoint = Callable[..., JointMap]
@@ -34,9 +37,9 @@ ALIGNMENT = Alignment(
     np.array([1.25, -3.0, 0.1]),
     "refused",
     0.125,
-    "too little in common",
-    {"common": 1.5},
-    {"transform": [0.0, 1.0, 2.0], "common": 0.5},
+    Reason(ReasonKind.LITTLE_COMMON, {"common": 1.5}),
+    Evidence(common=1.5),
+    RunnerUp(np.array([0.0, 1.0, 2.0]), evidence=Evidence(common=0.5)),
 )
 
 
@@ -66,9 +69,9 @@ def status() -> StatusMessage:
     )
 
 
-def alignments() -> AlignmentMessage:
+def alignments(*found: Alignment) -> AlignmentMessage:
     versions = [MapVersion(robot=robot, boot="x", version=3) for robot in "ab"]
-    return AlignmentMessage.pack("a", versions[0], versions[1], [ALIGNMENT])
+    return AlignmentMessage.pack("a", versions[0], versions[1], found or [ALIGNMENT])
 
 
 def messages(make_map: MakeMap, make_joint: MakeJoint) -> list[Message]:
@@ -150,27 +153,79 @@ def test_a_joint_map_arrives_with_its_alignments(random_joint: MakeJoint) -> Non
     assert before.robots.keys() == after.robots.keys()
     assert np.allclose(before.segment_confidence, after.segment_confidence, atol=1e-3)
     assert_same_lines(before.map, after.map)
-    assert arrived.alignments[0].runner_up == sent.alignments[0].runner_up
-    assert arrived.alignments[0].evidence == sent.alignments[0].evidence
+    assert_same_alignment(arrived.alignments[0], sent.alignments[0])
 
 
-def test_an_alignment_arrives_as_it_was_sent() -> None:
-    (arrived,) = decode(AlignmentMessage, encode(alignments())).unpack()
-    assert np.array_equal(arrived.transform, ALIGNMENT.transform)
-    assert (arrived.reference, arrived.other) == ("a/0", "b/12")
-    assert (arrived.decision, arrived.confidence) == ("refused", 0.125)
-    assert arrived.runner_up == ALIGNMENT.runner_up
+def assert_same_alignment(found: Alignment, expected: Alignment) -> None:
+    """Assert that they are equal in all they have."""
+    assert np.array_equal(found.transform, expected.transform)
+    for name in ("reference", "other", "decision", "confidence", "cause", "evidence", "status"):
+        assert getattr(found, name) == getattr(expected, name)
+    assert found.reason == expected.reason
+    assert (found.runner_up is None) == (expected.runner_up is None)
+    if found.runner_up is not None and expected.runner_up is not None:
+        assert np.array_equal(found.runner_up.transform, expected.runner_up.transform)
+        assert found.runner_up.by_name() == expected.runner_up.by_name()
+
+
+@given(some_alignments())
+@settings(deadline=None)
+def test_an_alignment_arrives_as_it_was_sent(sent: Alignment) -> None:
+    (arrived,) = decode(AlignmentMessage, encode(alignments(sent))).unpack()
+    assert_same_alignment(arrived, sent)
+
+
+def test_an_alignment_without_cause_and_status_arrives_with_its_sentence() -> None:
+    """As programs send it that know of neither, and as stores have kept it."""
+    fields = alignments().model_dump()
+    for name in ("cause", "status", "set_aside_by", "revoked_in"):
+        del fields["alignments"][0][name]
+    body = envelope(alignments(), msgpack.packb(fields))
+    (arrived,) = decode(AlignmentMessage, body).unpack()
+    assert_same_alignment(arrived, replace(ALIGNMENT, cause=Reason.words(ALIGNMENT.reason)))
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "match"),
+    [
+        ("cause", {"kind": "rival", "numbers": {"common": 1.0}}, "reason rival: expected"),
+        ("cause", {"kind": "gossip", "numbers": {}}, "cause.kind"),
+        ("cause", {"kind": "words", "numbers": {}, "text": "\x1b[2J"}, "printable"),
+        ("status", "revoked", "expected a version"),
+        ("status", "lost", "status"),
+        ("set_aside_by", (("a/0", "B"),), "set_aside_by"),
+        ("revoked_in", -1, "revoked_in"),
+    ],
+)
+def test_a_cause_or_status_that_makes_no_sense_is_refused(
+    field: str, value: object, match: str
+) -> None:
+    fields = alignments().model_dump()
+    fields["alignments"][0][field] = value
+    with pytest.raises(MessageError, match=match):
+        decode(AlignmentMessage, envelope(alignments(), msgpack.packb(fields)))
+
+
+def test_reasons_about_reasons_without_end_are_refused() -> None:
+    cause: dict[str, object] = {"kind": "no_shape", "numbers": {}}
+    for _ in range(200):
+        cause = {"kind": "met_before", "numbers": {}, "found": cause}
+    fields = alignments().model_dump()
+    fields["alignments"][0]["cause"] = cause
+    with pytest.raises(MessageError):
+        decode(AlignmentMessage, envelope(alignments(), msgpack.packb(fields)))
 
 
 def test_what_could_not_be_measured_is_left_out() -> None:
-    numbers = {"common": 2.0, "residual": np.inf, "overlap": np.nan}
-    rival = {"transform": [0.0, 0.0, 0.0], **numbers}
+    numbers = Evidence(common=2.0, residual=np.inf, overlap=np.nan)
+    rival = RunnerUp(np.zeros(3), np.nan, evidence=numbers)
     poor = replace(ALIGNMENT, evidence=numbers, runner_up=rival)
     versions = [MapVersion(robot=robot, boot="x", version=3) for robot in "ab"]
     sent = AlignmentMessage.pack("a", versions[0], versions[1], [poor])
     (arrived,) = decode(AlignmentMessage, encode(sent)).unpack()
-    assert arrived.evidence == {"common": 2.0}
-    assert arrived.runner_up == {"transform": [0.0, 0.0, 0.0], "common": 2.0}
+    assert arrived.evidence == Evidence(common=2.0)
+    assert arrived.runner_up is not None
+    assert arrived.runner_up.by_name() == {"common": 2.0}
 
 
 def test_a_status_arrives_as_it_was_sent() -> None:
