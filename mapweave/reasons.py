@@ -119,7 +119,7 @@ class Reason:
     def picked(
         cls, kind: ReasonKind, numbers: Mapping[str, float], found: "Reason | None", text: str
     ) -> Self:
-        """Return a reason with those of `numbers` that its kind knows; see there for the rest."""
+        """Return the reason with those of `numbers` that its kind has; others are left out."""
         names = (*_NUMBERS.get(kind, ()), *(_RIVAL if kind in _MAY_NAME_RIVAL else ()))
         return cls(kind, {name: numbers[name] for name in names if name in numbers}, found, text)
 

@@ -134,7 +134,7 @@ class _Graph:
         """Return `alignment`: less sure if others contradict it, and ambiguous if set aside."""
         edge = self._edge_of.get(id(alignment))
         if edge is None:
-            return replace(alignment, status=None)
+            return alignment if alignment.status is None else replace(alignment, status=None)
         sure = min(alignment.confidence, part_right(edge, self._explanations))
         if edge not in self._right:
             cause, by = self._objection(edge, alignment.cause)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mapweave.geometry import se2
+from mapweave.reasons import ReasonKind, Status, StatusKind
 from mapweave.team.joint_optimization import JointOptimizer
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import last_version
@@ -20,7 +21,7 @@ from tests.fusion_server.conftest import Network
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mapweave.maps import JointMap, RobotMap
+    from mapweave.maps import Alignment, JointMap, RobotMap
     from tests.fusion_server.conftest import MakeAlignments, MakeMap
 
 POSES = {
@@ -84,10 +85,18 @@ def team(make_map: MakeMap, make_alignments: MakeAlignments) -> Team:
     return Team(make_map, make_alignments)
 
 
-def reason_of(joint: JointMap, pair: str) -> str:
+def alignment_of(joint: JointMap, pair: str) -> Alignment:
     names = {f"{robot}/0" for robot in pair}
     (found,) = (a for a in joint.alignments if {a.reference, a.other} == names)
-    return found.reason
+    return found
+
+
+def reason_of(joint: JointMap, pair: str) -> str:
+    return alignment_of(joint, pair).reason
+
+
+def status_of(joint: JointMap, pair: str) -> Status | None:
+    return alignment_of(joint, pair).status
 
 
 def test_a_pair_compared_again_and_refused_comes_apart_and_the_version_says_why(
@@ -102,6 +111,8 @@ def test_a_pair_compared_again_and_refused_comes_apart_and_the_version_says_why(
     assert Network.groups(joined) == [["a/0", "b/0"]]
     assert Network.groups(parted) == [["a/0"], ["b/0"]]
     assert reason_of(joined, "ab") == "40 m of wall in common"
+    assert status_of(joined, "ab") == Status(StatusKind.RELIED_ON)
+    assert status_of(parted, "ab") == Status(StatusKind.REVOKED, revoked_in=2)
     assert reason_of(parted, "ab") == "revoked in version 2: only 3 m of wall in common"
     for component in parted.components:
         (pose,) = component.robots.values()
@@ -132,7 +143,14 @@ def test_a_join_that_later_cycles_contradict_is_revoked_and_all_come_to_lie_righ
     for name, pose in component.robots.items():
         expected = se2.between(POSES["a"], POSES[name[0]])
         np.testing.assert_allclose(pose, expected, atol=1e-3)
-    assert reason_of(right, "ab").startswith("revoked in version 2: 40.1 m and 29° off what ")
+    wrong_one = alignment_of(right, "ab")
+    assert wrong_one.reason.startswith("revoked in version 2: 40.1 m and 29° off what ")
+    assert wrong_one.cause.kind is ReasonKind.OTHERS_CONTRADICT
+    assert wrong_one.status is not None and wrong_one.status.revoked_in == 2
+    assert set(wrong_one.status.set_aside_by) <= {
+        (f"{a}/0", f"{b}/0") for a, b in ("ac", "bc", "ad", "bd")
+    }
+    assert wrong_one.status.set_aside_by
     assert component.confidence > 0.99
 
 
@@ -162,4 +180,5 @@ def test_after_a_restart_it_is_still_known_what_was_relied_on(team: Team, tmp_pa
     team.align("ab", "refused", reason="only 2 m of wall in common")
     parted = team.next_version()
     assert parted.version == 2
+    assert status_of(parted, "ab") == Status(StatusKind.REVOKED, revoked_in=2)
     assert reason_of(parted, "ab") == "revoked in version 2: only 2 m of wall in common"
