@@ -95,4 +95,4 @@ def _all_robots_joined(joint: JointMap, robots: int) -> bool:
     )
 
 
-command = Command("Join robots' maps where their shapes prove it.", _configure, _run)
+command = Command("Join robots' maps where what both saw proves it.", _configure, _run)

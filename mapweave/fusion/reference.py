@@ -199,7 +199,7 @@ def close_parts(
         (n, 4) and (m, 4) x1 y1 x2 y2 [m], one frame.
     """
     near = hausdorff(first, second) < threshold
-    return near.any(axis=1), near.any(axis=0)
+    return np.asarray(near.any(axis=1)), np.asarray(near.any(axis=0))
 
 
 def hausdorff(first: FloatArray, second: FloatArray) -> FloatArray:

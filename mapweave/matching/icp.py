@@ -3,8 +3,9 @@
 The paper extends ICP [5] to respect the correspondence of polylines. Here a point finds its
 partner among points with a like normal, seen from the same side, which rules out partners
 around corners and behind walls; and, where corresponding polylines are known, a pair on two
-that do not correspond does not pull. Distances are measured along the partner's normal, because
-a wall holds a point across it and not along it.
+that do not correspond does not pull. They are known where shapes have proposed the start, in
+tracking; fusion, loops and the predicted pose go by normals alone. Distances are measured along the
+partner's normal, because a wall holds a point across it and not along it.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Fusion joins maps where shape and free space prove it, and says why where not (paper, VIII)."""
+"""Fusion joins maps where walls and free space prove it, and says why where not (paper, VIII)."""
 
 import re
 

@@ -117,8 +117,9 @@ def test_close_parts_are_symmetric_and_move_with_the_maps(seed: int) -> None:
     pose = random_pose(np.random.default_rng(seed))
     here, there = close_parts(first, second, 0.25)
     np.testing.assert_array_equal(np.concatenate(close_parts(second, first, 0.25)), [*there, *here])
-    moved = (se2.transform_segments(pose, s) for s in (first, second))
-    np.testing.assert_array_equal(np.concatenate(close_parts(*moved, 0.25)), [*here, *there])
+    moved = [se2.transform_segments(pose, s) for s in (first, second)]
+    still = np.concatenate(close_parts(moved[0], moved[1], 0.25))
+    np.testing.assert_array_equal(still, [*here, *there])
     assert here[:5].all()
     assert there[:5].all()
 
