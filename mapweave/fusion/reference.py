@@ -16,7 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.maps import LineMap
-from mapweave.shape.part_match import PartMatch, best_part
+from mapweave.shape.partial_match import best_match
+from mapweave.shape.stretch import stretch_of
 from mapweave.shape.tangent_space import complexities, complexity, similarity, tangent_space
 
 
@@ -38,6 +39,22 @@ class ReferenceParameters(BaseModel):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Counterpart:
+    """Q_j, what of M_2 is most like an object of M_1.
+
+    Attributes
+    ----------
+    stretch
+        (k, 4) the stretch of a polyline of M_2 [m], its frame: as long as the object.
+    similarity
+        s(P_i, Q_j) [rad²].
+    """
+
+    stretch: FloatArray
+    similarity: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
     """One round of the loop: a correspondence P_i ~ Q_j and what it comes to.
 
@@ -47,8 +64,8 @@ class Proposal:
         (n, 4) P_i [m], frame of M_1.
     complexity
         sc(P_i) [rad²].
-    match
-        Q_j, the stretch of a polyline of M_2 that is most like it, with s(P_i, Q_j).
+    counterpart
+        Q_j, with s(P_i, Q_j).
     transform
         (3,) from M_2 to M_1 [m, m, rad], of V1.
     shared_complexity
@@ -59,7 +76,7 @@ class Proposal:
 
     part: FloatArray
     complexity: float
-    match: PartMatch
+    counterpart: Counterpart
     transform: FloatArray
     shared_complexity: float
     confirmed: bool
@@ -92,13 +109,13 @@ def proposals(
     """
     p = parameters or ReferenceParameters()
     for part in salient_parts(reference, p):  # H1
-        match = most_similar(part, other)  # H2
-        if match is None:
+        found = most_similar(part, other)  # H2
+        if found is None:
             continue  # no polyline of M_2 is as long: nothing to validate, back to H1
-        transform = congruent_alignment(part, match.stretch)  # V1
+        transform = congruent_alignment(part, found.stretch)  # V1
         shared = shared_complexity(reference, other.moved(transform), p.hausdorff)  # V2
         confirmed = shared > p.min_complexity
-        yield Proposal(part, complexity(part), match, transform, shared, confirmed)
+        yield Proposal(part, complexity(part), found, transform, shared, confirmed)
 
 
 def salient_parts(lines: LineMap, parameters: ReferenceParameters) -> list[FloatArray]:
@@ -128,7 +145,7 @@ def _sequences(polyline: FloatArray, p: ReferenceParameters) -> list[FloatArray]
     return [polyline[k : k + count] for k in range(len(polyline) - count + 1)]
 
 
-def most_similar(part: FloatArray, lines: LineMap) -> PartMatch | None:
+def most_similar(part: FloatArray, lines: LineMap) -> Counterpart | None:
     """Return the stretch Q_j of a map that is most like (n, 4) `part` [m] (VIII, H2, and VIII-C).
 
     "Using a shape similarity measure s find a polyline Q_j of map M_2 for which s(P_i, Q_j) is
@@ -136,8 +153,12 @@ def most_similar(part: FloatArray, lines: LineMap) -> PartMatch | None:
     as long as `part` and lies on one polyline; None where no polyline is as long.
     """
     length = tangent_space(part).length
-    matches = [best_part(part, each) for each in lines.polylines if _length(each) >= length]
-    return min(matches, key=lambda match: match.s, default=None)
+    long = [each for each in lines.polylines if _length(each) >= length]
+    matches = [(best_match(part, each), each) for each in long]
+    if not matches:
+        return None
+    best, polyline = min(matches, key=lambda match: match[0].similarity)
+    return Counterpart(stretch_of(polyline, best.start, best.end), best.similarity)
 
 
 def congruent_alignment(part: FloatArray, match: FloatArray) -> FloatArray:

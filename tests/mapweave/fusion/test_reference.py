@@ -63,7 +63,7 @@ def test_the_most_similar_stretch_of_all_polylines_is_taken() -> None:
     lines = line_map(np.vstack([WALL, FLAT_ANGLE, RIGHT_ANGLE + 5]))
     found = most_similar(RIGHT_ANGLE / 2, lines)
     assert found is not None
-    assert found.s == pytest.approx(0, abs=1e-12)
+    assert found.similarity == pytest.approx(0, abs=1e-12)
     np.testing.assert_allclose(found.stretch, [[6, 5, 7, 5], [7, 5, 7, 6]])
 
 

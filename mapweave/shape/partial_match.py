@@ -1,7 +1,7 @@
 """The best match of a part within a polyline (paper, VIII, H2 and VIII-C).
 
 The paper slides a window along the list of line segments. Here it slides along the arc length, and
-no step is chosen: let the part, of length l, lie on the stretch of the polyline that begins at arc
+no step is chosen: let the part, of length l, lie on the stretch of the polyline that starts at arc
 length t, and f = T(part) - T(stretch). Between two offsets at which a breakpoint of the one meets
 a breakpoint of the other, the widths of the steps of f are linear in t and their heights do not
 change. So of
@@ -10,7 +10,7 @@ change. So of
 
 the first term is linear and the second one the square of something linear: s is concave there, and
 least at an end. The least s of all offsets is therefore found among at most (n + 1) (m + 1) of
-them, for a part of n segments and a polyline of m: exactly, also where the part begins or ends in
+them, for a part of n segments and a polyline of m: exactly, also where the part starts or ends in
 the middle of a segment.
 
 The stretch is as long as the part, as both maps are in metres; s itself knows no scale.
@@ -39,38 +39,37 @@ class LongPartError(MapweaveError):
 
     def __init__(self, part: float, polyline: float) -> None:
         super().__init__(
-            f"part of {part:g} m: expected at most the {polyline:g} m of the polyline"
-            " that it is looked for in"
+            f"part: expected at most the polyline's length, {polyline:g} m, got {part:g} m"
         )
         self.part = part
         self.polyline = polyline
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PartMatch:
-    """The stretch of a polyline that is most like a part.
+@dataclass(frozen=True, slots=True)
+class PartialMatch:
+    """Where on a polyline a part fits best.
 
     Attributes
     ----------
-    s
+    start, end
+        The stretch, in arc length from the polyline's beginning, its gaps left out [m]: as long as
+        the part.
+    similarity
         s(part, stretch) [rad²]: 0 for equal shapes.
-    theta
-        Θ(part, stretch) [rad] in (-π, π]: turning the part by it makes it most like the stretch.
-    begin
-        Arc length at which the stretch begins, from the start of the polyline, without gaps [m].
-    stretch
-        (k, 4) x1 y1 x2 y2 [m], polyline's frame: as long as the part, the first and the last
-        segment cut where it begins and ends.
+    rotation
+        Θ [rad] in (-π, π]: turning the part by it makes it most like the stretch.
     """
 
-    s: float
-    theta: float
-    begin: float
-    stretch: FloatArray
+    start: float
+    end: float
+    similarity: float
+    rotation: float
 
 
-def best_part(part: FloatArray, polyline: FloatArray) -> PartMatch:
-    """Return the stretch of `polyline` that is most like `part` (paper, VIII, H2).
+def best_match(part: FloatArray, polyline: FloatArray) -> PartialMatch:
+    """Return the stretch of `polyline`, as long as `part`, that is most like it (paper, VIII, H2).
+
+    Of equally good stretches the first.
 
     Parameters
     ----------
@@ -78,11 +77,6 @@ def best_part(part: FloatArray, polyline: FloatArray) -> PartMatch:
         (n, 4) x1 y1 x2 y2 [m], any frame, in order.
     polyline
         (m, 4) x1 y1 x2 y2 [m], any frame, in order; at least as long as `part`, gaps not counted.
-
-    Returns
-    -------
-    PartMatch
-        Of equal ones that which begins first.
 
     Raises
     ------
@@ -94,30 +88,14 @@ def best_part(part: FloatArray, polyline: FloatArray) -> PartMatch:
     wanted, known = tangent_space(part), tangent_space(polyline)
     if wanted.length > known.length * (1 + _ROUNDING):
         raise LongPartError(wanted.length, known.length)
-    begins = _offsets(wanted, known)
-    s, mean = _variances(wanted, known, begins)
+    starts = _starts(wanted, known)
+    s, mean = _variances(wanted, known, starts)
     best = int(np.argmin(np.round(s, 12)))  # rounded, so that the first of equals is the first
-    begin = float(begins[best])
-    stretch = stretch_of(polyline, begin, begin + wanted.length)
-    return PartMatch(max(float(s[best]), 0.0), float(wrap(-mean[best])), begin, stretch)
+    start = float(starts[best])
+    return PartialMatch(start, start + wanted.length, float(s[best]), float(wrap(-mean[best])))
 
 
-def stretch_of(polyline: FloatArray, begin: float, end: float) -> FloatArray:
-    """Return the (k, 4) segments of (n, 4) `polyline` from arc length `begin` to `end` [m]."""
-    steps = polyline[:, 2:] - polyline[:, :2]
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    ends = np.cumsum(lengths)
-    starts = ends - lengths
-    shortest = _ROUNDING * max(float(ends[-1]), 1.0)
-    used = np.flatnonzero(np.minimum(ends, end) - np.maximum(starts, begin) > shortest)
-    unit = steps[used] / lengths[used, None]
-    low = (np.maximum(begin, starts[used]) - starts[used])[:, None]
-    high = (np.minimum(end, ends[used]) - starts[used])[:, None]
-    first = polyline[used, :2]
-    return np.hstack([first + low * unit, first + high * unit])
-
-
-def _offsets(part: TangentSpace, polyline: TangentSpace) -> FloatArray:
+def _starts(part: TangentSpace, polyline: TangentSpace) -> FloatArray:
     """(k,) ascending arc lengths [m] where breakpoints meet and the part is on the polyline."""
     room = max(polyline.length - part.length, 0.0)
     meeting = polyline.length * polyline.breaks[:, None] - part.length * part.breaks
@@ -127,19 +105,19 @@ def _offsets(part: TangentSpace, polyline: TangentSpace) -> FloatArray:
 
 
 def _variances(
-    part: TangentSpace, polyline: TangentSpace, begins: FloatArray
+    part: TangentSpace, polyline: TangentSpace, starts: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return (k,) variance and mean of T(part) - T(stretch) for stretches that begin at `begins`.
+    """Return (k,) variance and mean of T(part) - T(stretch) for stretches that begin at `starts`.
 
     All at once: breakpoints of both, of one row for each stretch, in order.
     """
-    ours = part.length * part.breaks + begins[:, None]
-    theirs = np.broadcast_to(polyline.length * polyline.breaks, (len(begins), len(polyline.breaks)))
+    ours = part.length * part.breaks + starts[:, None]
+    theirs = np.broadcast_to(polyline.length * polyline.breaks, (len(starts), len(polyline.breaks)))
     theirs = np.clip(theirs, ours[:, :1], ours[:, -1:])  # what lies outside has no width
     breaks = np.sort(np.hstack([ours, theirs]), axis=1)
     width = np.diff(breaks, axis=1) / part.length
     middle = (breaks[:, 1:] + breaks[:, :-1]) / 2
-    difference = part.at((middle - begins[:, None]) / part.length) - polyline.at(
+    difference = part.at((middle - starts[:, None]) / part.length) - polyline.at(
         middle / polyline.length
     )
     mean = (width * difference).sum(axis=1)

@@ -5,9 +5,11 @@ from math import pi
 import numpy as np
 import pytest
 
+from mapweave.errors import MapweaveError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.shape.part_match import LongPartError, best_part, stretch_of
+from mapweave.shape.partial_match import best_match
+from mapweave.shape.stretch import stretch_of
 from mapweave.shape.tangent_space import NoShapeError, similarity
 
 SEEDS = range(8)
@@ -40,9 +42,10 @@ def length(polyline: FloatArray) -> float:
 
 def test_a_corner_is_found_in_the_middle_of_longer_walls() -> None:
     """By hand: the turn comes after 3 m, a metre of the part before it, so it begins at 2 m."""
-    found = best_part(CORNER, ELBOW)
-    assert (found.s, found.theta, found.begin) == pytest.approx((0, 0, 2), abs=1e-12)
-    np.testing.assert_allclose(found.stretch, [[2, 0, 3, 0], [3, 0, 3, 1]], atol=1e-12)
+    found = best_match(CORNER, ELBOW)
+    assert (found.similarity, found.rotation, found.start) == pytest.approx((0, 0, 2), abs=1e-12)
+    stretch = stretch_of(ELBOW, found.start, found.end)
+    np.testing.assert_allclose(stretch, [[2, 0, 3, 0], [3, 0, 3, 1]], atol=1e-12)
 
 
 def test_of_a_flatter_corner_the_part_is_off_by_half_the_difference_on_either_leg() -> None:
@@ -52,36 +55,37 @@ def test_of_a_flatter_corner_the_part_is_off_by_half_the_difference_on_either_le
     """
     x, y = 3 + 3 * np.cos(pi / 3), 3 * np.sin(pi / 3)
     flatter = np.array([[0.0, 0, 3, 0], [3, 0, x, y]])
-    found = best_part(CORNER, flatter)
-    assert (found.s, found.begin) == pytest.approx(((pi / 12) ** 2, 2))
-    assert found.theta == pytest.approx(-pi / 12)  # from a mean of 45° to one of 30°
+    found = best_match(CORNER, flatter)
+    assert (found.similarity, found.start) == pytest.approx(((pi / 12) ** 2, 2))
+    assert found.rotation == pytest.approx(-pi / 12)  # from a mean of 45° to one of 30°
 
 
 def test_on_a_straight_wall_all_offsets_are_alike_and_the_first_is_taken() -> None:
     """By hand: what is left of a right angle is its own complexity, (π/4)²."""
-    found = best_part(CORNER, np.array([[4.0, 1, 9, 1]]))
-    assert (found.s, found.begin) == pytest.approx(((pi / 4) ** 2, 0))
+    found = best_match(CORNER, np.array([[4.0, 1, 9, 1]]))
+    assert (found.similarity, found.start) == pytest.approx(((pi / 4) ** 2, 0))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_offset_of_a_fine_grid_is_better(seed: int) -> None:
     """The offsets where breakpoints meet suffice: a brute-force slide finds nothing below them."""
     part, polyline = pair(seed)
-    found = best_part(part, polyline)
+    found = best_match(part, polyline)
     begins = np.linspace(0, length(polyline) - length(part), 400)
     grid = [similarity(part, stretch_of(polyline, b, b + length(part)))[0] for b in begins]
-    assert found.s <= min(grid) + 1e-9
-    assert min(grid) == pytest.approx(found.s, abs=0.15)  # and the grid comes near it
+    assert found.similarity <= min(grid) + 1e-9
+    assert min(grid) == pytest.approx(found.similarity, abs=0.15)  # and the grid comes near it
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_is_found_is_as_similar_as_it_says_and_as_long_as_the_part(seed: int) -> None:
     part, polyline = pair(seed)
-    found = best_part(part, polyline)
-    s, theta = similarity(part, found.stretch)
-    assert found.s == pytest.approx(s, abs=1e-9)
-    assert float(se2.wrap(found.theta - theta)) == pytest.approx(0, abs=1e-9)
-    assert length(found.stretch) == pytest.approx(length(part))
+    found = best_match(part, polyline)
+    stretch = stretch_of(polyline, found.start, found.end)
+    s, theta = similarity(part, stretch)
+    assert found.similarity == pytest.approx(s, abs=1e-9)
+    assert float(se2.wrap(found.rotation - theta)) == pytest.approx(0, abs=1e-9)
+    assert length(stretch) == pytest.approx(length(part))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -90,44 +94,46 @@ def test_a_part_cut_out_and_moved_is_found_where_it_was(seed: int) -> None:
     rng = np.random.default_rng(seed)
     begin = rng.uniform(0.5, length(polyline) - 4.5)
     pose = rng.uniform(-pi, pi, 3)
-    found = best_part(
+    found = best_match(
         se2.transform_segments(pose, stretch_of(polyline, begin, begin + 4)), polyline
     )
-    assert (found.s, found.begin) == pytest.approx((0, begin), abs=1e-6)
-    assert float(se2.wrap(found.theta + pose[2])) == pytest.approx(0, abs=1e-9)
+    assert (found.similarity, found.start) == pytest.approx((0, begin), abs=1e-6)
+    assert float(se2.wrap(found.rotation + pose[2])) == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rigid_motions_change_the_rotation_alone(seed: int) -> None:
     part, polyline = pair(seed)
     a, b = np.random.default_rng(seed).uniform(-pi, pi, (2, 3))
-    still = best_part(part, polyline)
-    moved = best_part(se2.transform_segments(a, part), se2.transform_segments(b, polyline))
-    assert (moved.s, moved.begin) == pytest.approx((still.s, still.begin))
-    turned = se2.wrap(moved.theta - (still.theta + b[2] - a[2]))
+    still = best_match(part, polyline)
+    moved = best_match(se2.transform_segments(a, part), se2.transform_segments(b, polyline))
+    assert (moved.similarity, moved.start) == pytest.approx((still.similarity, still.start))
+    turned = se2.wrap(moved.rotation - (still.rotation + b[2] - a[2]))
     assert float(turned) == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_walked_the_other_way_the_same_stretch_is_found(seed: int) -> None:
     part, polyline = pair(seed)
-    there, back = best_part(part, polyline), best_part(reversed_(part), reversed_(polyline))
-    assert back.s == pytest.approx(there.s)
-    assert back.begin == pytest.approx(length(polyline) - length(part) - there.begin)
-    np.testing.assert_allclose(reversed_(back.stretch), there.stretch, atol=1e-9)
+    there, back = best_match(part, polyline), best_match(reversed_(part), reversed_(polyline))
+    assert back.similarity == pytest.approx(there.similarity)
+    assert back.start == pytest.approx(length(polyline) - length(part) - there.start)
+    assert back.end == pytest.approx(length(polyline) - there.start)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_scaling_both_scales_where_the_part_begins_alone(seed: int) -> None:
     part, polyline = pair(seed)
-    still, scaled = best_part(part, polyline), best_part(3.7 * part, 3.7 * polyline)
-    assert (scaled.s, scaled.begin) == pytest.approx((still.s, 3.7 * still.begin))
+    still, scaled = best_match(part, polyline), best_match(3.7 * part, 3.7 * polyline)
+    assert (scaled.similarity, scaled.start) == pytest.approx((still.similarity, 3.7 * still.start))
 
 
 def test_a_part_as_long_as_the_polyline_is_compared_as_a_whole() -> None:
-    found = best_part(CORNER, reversed_(CORNER))
-    assert (found.s, found.begin) == pytest.approx(((pi / 2) ** 2, 0))  # a right turn, seen so
-    np.testing.assert_allclose(found.stretch, reversed_(CORNER))
+    found = best_match(CORNER, reversed_(CORNER))
+    assert (found.similarity, found.start) == pytest.approx(
+        ((pi / 2) ** 2, 0)
+    )  # a right turn, seen so
+    assert found.end == pytest.approx(2)
 
 
 def test_a_stretch_leaves_gaps_and_segments_without_length_out() -> None:
@@ -137,10 +143,10 @@ def test_a_stretch_leaves_gaps_and_segments_without_length_out() -> None:
 
 
 def test_a_part_longer_than_the_polyline_is_refused_with_both_lengths() -> None:
-    with pytest.raises(LongPartError, match=r"part of 6 m: expected at most the 2 m"):
-        best_part(ELBOW, CORNER)
+    with pytest.raises(MapweaveError, match=r"part: expected at most .* 2 m, got 6 m"):
+        best_match(ELBOW, CORNER)
 
 
 def test_a_part_without_length_has_no_shape() -> None:
     with pytest.raises(NoShapeError):
-        best_part(np.array([[1.0, 1, 1, 1]]), CORNER)
+        best_match(np.array([[1.0, 1, 1, 1]]), CORNER)
