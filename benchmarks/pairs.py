@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.stretches import Stretch, alignment_error, common
-from mapweave.fusion.align import FusionParameters, align_robots
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.maps import Alignment
 
 Outcome = Literal["joined right", "joined wrong", "ambiguous", "refused"]
@@ -103,7 +103,7 @@ def choose_pairs(
 def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None = None) -> Pair:
     """Align the maps of two stretches as robots do, and judge what comes of it."""
     start = time.perf_counter()
-    alignments = align_robots(first.robot_map, second.robot_map, parameters)
+    alignments = align(first.robot_map, second.robot_map, parameters)
     seconds = time.perf_counter() - start
     return Pair(
         first.name,

@@ -47,10 +47,29 @@ class FusionParameters(BaseModel):
     min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
 
 
-def align_robots(
+def align(
     reference: RobotMap, other: RobotMap, parameters: FusionParameters | None = None
 ) -> list[Alignment]:
-    """Compare every component of `reference` with every one of `other`."""
+    """Compare every component of `reference` with every one of `other` (paper, VIII).
+
+    Parameters
+    ----------
+    reference, other
+        Maps of two robots, which need share nothing.
+    parameters
+        Of each stage.
+
+    Returns
+    -------
+    list of Alignment
+        One for each pair of components, accepted, ambiguous or refused: each says how sure it is,
+        and why.
+
+    Examples
+    --------
+    >>> align(RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ()))  # nothing in them
+    []
+    """
     p = parameters or FusionParameters()
     ours, theirs = ([_Component(m, c, p) for c in m.components] for m in (reference, other))
     return [_align(a, b, p) for a, b in itertools.product(ours, theirs)]

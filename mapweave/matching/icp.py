@@ -11,8 +11,8 @@ partner's normal, because a wall holds a point across it and not along it.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.spatial import KDTree
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -59,12 +59,14 @@ class Target:
     """
 
     oriented: OrientedPoints
-    tree: KDTree
+    tree: "scipy.spatial.KDTree"
 
     @classmethod
     def of(cls, oriented: OrientedPoints, parameters: IcpParameters) -> "Target":
         """Index `surface`."""
-        return cls(oriented, KDTree(_features(oriented, parameters), balanced_tree=False))
+        return cls(
+            oriented, scipy.spatial.KDTree(_features(oriented, parameters), balanced_tree=False)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

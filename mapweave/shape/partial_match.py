@@ -19,30 +19,16 @@ The stretch is as long as the part, as both maps are in metres; s itself knows n
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mapweave.errors import MapweaveError
+from mapweave.errors import ArgumentError
+from mapweave.geometry.arguments import as_segments
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.se2 import wrap
 from mapweave.shape.tangent_space import TangentSpace, tangent_space
 
-_ROUNDING = 1e-9  # shares of a length that sums of lengths may differ by
-
-
-class LongPartError(MapweaveError):
-    """A part that is longer than the polyline that it is looked for in.
-
-    Parameters
-    ----------
-    part, polyline
-        Their lengths [m].
-    """
-
-    def __init__(self, part: float, polyline: float) -> None:
-        super().__init__(
-            f"part: expected at most the polyline's length, {polyline:g} m, got {part:g} m"
-        )
-        self.part = part
-        self.polyline = polyline
+_ROUNDING = 1e-9
+"""Share of a length that sums of lengths may differ by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +38,7 @@ class PartialMatch:
     Attributes
     ----------
     start, end
-        The stretch, in arc length from the polyline's beginning, its gaps left out [m]: as long as
-        the part.
+        The stretch, in arc length from the polyline's beginning, its gaps left out [m].
     similarity
         s(part, stretch) [rad²]: 0 for equal shapes.
     rotation
@@ -66,33 +51,43 @@ class PartialMatch:
     rotation: float
 
 
-def best_match(part: FloatArray, polyline: FloatArray) -> PartialMatch:
-    """Return the stretch of `polyline`, as long as `part`, that is most like it (paper, VIII, H2).
+def best_match(part: ArrayLike, polyline: ArrayLike) -> PartialMatch:
+    """Return the stretch of `polyline`, as long as `part`, that is most like it (paper, V, VIII).
 
-    Of equally good stretches the first.
+    Neither position nor direction matters; scale does, unlike in `similarity`: what is compared is
+    as long as the part. Of equally good stretches the first.
 
     Parameters
     ----------
-    part
-        (n, 4) x1 y1 x2 y2 [m], any frame, in order.
-    polyline
-        (m, 4) x1 y1 x2 y2 [m], any frame, in order; at least as long as `part`, gaps not counted.
+    part, polyline
+        (n, 4) x1 y1 x2 y2 [m] or (n, 2) vertices [m], each in any frame, in order.
 
     Raises
     ------
+    ArgumentError
+        If one has another shape, or holds NaN or infinity, or the part is longer than the polyline.
     NoShapeError
         If one of them has no length.
-    LongPartError
-        If `part` is the longer one.
+
+    Examples
+    --------
+    >>> corner = [[0, 0], [1, 0], [1, 1]]
+    >>> found = best_match(corner, [[0, 0], [0, 5], [-5, 5]])
+    >>> round(found.start, 6), round(found.end, 6), round(found.similarity, 6)
+    (4.0, 6.0, 0.0)
     """
-    wanted, known = tangent_space(part), tangent_space(polyline)
-    if wanted.length > known.length * (1 + _ROUNDING):
-        raise LongPartError(wanted.length, known.length)
-    starts = _starts(wanted, known)
-    s, mean = _variances(wanted, known, starts)
+    small = tangent_space(as_segments("part", part))
+    large = tangent_space(as_segments("polyline", polyline))
+    if small.length > large.length * (1 + _ROUNDING):
+        raise ArgumentError(
+            "part",
+            f"expected at most the polyline's length, {large.length:g} m, got {small.length:g} m",
+        )
+    starts = _starts(small, large)
+    s, mean = _variances(small, large, starts)
     best = int(np.argmin(np.round(s, 12)))  # rounded, so that the first of equals is the first
     start = float(starts[best])
-    return PartialMatch(start, start + wanted.length, float(s[best]), float(wrap(-mean[best])))
+    return PartialMatch(start, start + small.length, float(s[best]), float(wrap(-mean[best])))
 
 
 def _starts(part: TangentSpace, polyline: TangentSpace) -> FloatArray:

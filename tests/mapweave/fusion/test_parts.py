@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapweave.fusion.align import FusionParameters, align_robots
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.fusion.parts import PartParameters, agreed, cut
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -57,7 +57,7 @@ def test_a_longer_path_has_longer_parts_and_not_more() -> None:
 def test_maps_bent_against_each_other_are_joined_in_parts() -> None:
     bent = np.radians(0.5)
     parameters = FusionParameters(parts=PartParameters(length=24.0))
-    (found,) = align_robots(robot("a", bent), robot("b", -bent), parameters)
+    (found,) = align(robot("a", bent), robot("b", -bent), parameters)
     assert found.decision == "accepted"
     assert "pairs of parts agree" in found.reason
     assert found.evidence["parts"] >= 2
@@ -66,7 +66,7 @@ def test_maps_bent_against_each_other_are_joined_in_parts() -> None:
 
 
 def test_maps_that_are_rigid_are_joined_as_wholes() -> None:
-    (found,) = align_robots(robot("a", 0.0), robot("b", 0.0))
+    (found,) = align(robot("a", 0.0), robot("b", 0.0))
     assert found.decision == "accepted"
     assert "parts" not in found.evidence
 

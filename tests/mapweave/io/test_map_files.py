@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 
 from mapweave.errors import FileError
 from mapweave.geometry.arrays import FloatArray
-from mapweave.io.map_files import read_any, read_joint, read_map, write_joint, write_map
+from mapweave.io.map_files import load, read_joint, read_map, write_joint, write_map
 from mapweave.maps import (
     Alignment,
     Decision,
@@ -209,7 +209,7 @@ def refusal(read: Callable[[Path], object], path: Path) -> str:
 def test_a_robot_map_comes_back_as_it_was_written(robot_map: RobotMap, tmp_path: Path) -> None:
     write_map(tmp_path / "map.json", robot_map)
     assert_same(read_map(tmp_path / "map.json"), robot_map)
-    assert_same(read_any(tmp_path / "map.json"), robot_map)
+    assert_same(load(tmp_path / "map.json"), robot_map)
 
 
 @SETTINGS
@@ -217,7 +217,7 @@ def test_a_robot_map_comes_back_as_it_was_written(robot_map: RobotMap, tmp_path:
 def test_a_joint_map_comes_back_as_it_was_written(joint: JointMap, tmp_path: Path) -> None:
     write_joint(tmp_path / "joint.json", joint)
     assert_same(read_joint(tmp_path / "joint.json"), joint)
-    assert_same(read_any(tmp_path / "joint.json"), joint)
+    assert_same(load(tmp_path / "joint.json"), joint)
 
 
 def test_a_map_file_has_the_published_fields(tmp_path: Path) -> None:
@@ -254,13 +254,13 @@ def test_what_is_not_finite_is_written_as_null(tmp_path: Path) -> None:
 def test_a_gzipped_file_is_read(content: dict[str, Any], tmp_path: Path) -> None:
     packed = tmp_path / "packed.json"
     packed.write_bytes(gzip.compress(json.dumps(content).encode()))
-    assert_same(read_any(packed), read_any(write(tmp_path, content)))
+    assert_same(load(packed), load(write(tmp_path, content)))
 
 
 @pytest.mark.parametrize("content", [MAP, JOINT], ids=["map", "joint"])
 def test_fields_of_a_later_version_are_ignored(content: dict[str, Any], tmp_path: Path) -> None:
-    expected = read_any(write(tmp_path, content))
-    assert_same(read_any(write(tmp_path, {**content, "colour": "red"})), expected)
+    expected = load(write(tmp_path, content))
+    assert_same(load(write(tmp_path, {**content, "colour": "red"})), expected)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +274,7 @@ def test_fields_of_a_later_version_are_ignored(content: dict[str, Any], tmp_path
 )
 def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_path: Path) -> None:
     path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
-    message = refusal(read_any, write(tmp_path, without(content, steps)))
+    message = refusal(load, write(tmp_path, without(content, steps)))
     assert message.startswith(f"{path.removeprefix('.')}: Field required; expected a map file")
 
 
@@ -315,7 +315,7 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
 def test_a_wrong_value_is_named_with_what_was_expected(
     content: dict[str, Any], steps: Steps, value: object, place: str, expected: str, tmp_path: Path
 ) -> None:
-    message = refusal(read_any, write(tmp_path, changed(content, steps, value)))
+    message = refusal(load, write(tmp_path, changed(content, steps, value)))
     assert message.startswith(place)
     assert expected in message
 
@@ -337,7 +337,7 @@ def test_the_other_kind_of_map_is_refused(tmp_path: Path) -> None:
         (gzip.compress(json.dumps(MAP).encode())[:-30], "the gzip stream is cut off"),
     ],
 )
-@pytest.mark.parametrize("read", [read_map, read_joint, read_any])
+@pytest.mark.parametrize("read", [read_map, read_joint, load])
 def test_what_is_no_map_file_is_refused(
     read: Callable[[Path], object], content: bytes, problem: str, tmp_path: Path
 ) -> None:
@@ -348,7 +348,7 @@ def test_what_is_no_map_file_is_refused(
     assert message.endswith("expected a map file (mapweave/map/1 or mapweave/joint/1)")
 
 
-@pytest.mark.parametrize("read", [read_map, read_joint, read_any])
+@pytest.mark.parametrize("read", [read_map, read_joint, load])
 def test_a_missing_file_and_a_folder_are_refused(
     read: Callable[[Path], object], tmp_path: Path
 ) -> None:
