@@ -14,6 +14,7 @@ from benchmarks import (
     kidnap,
     mapping,
     peers,
+    reference,
     team,
     wire,
 )
@@ -37,6 +38,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "kidnap": kidnap,
     "endurance": endurance,
     "fusion": fusion,
+    "reference": reference,
     "peers": peers,
     "team": team,
     "confidence": fit_confidence,

@@ -105,7 +105,7 @@ def _map(mapper: Mapper, scans: Sequence[Scan], order: Sequence[int], every: int
 
 def _renumbered(scans: Sequence[Scan], order: Sequence[int]) -> Iterator[Scan]:
     for number, k in enumerate(order):
-        yield Scan(number, float(number), scans[k].angles, scans[k].ranges)
+        yield Scan(scans[k].ranges, scans[k].angles, number, float(number))
 
 
 def _stretch(number: int, times: Sequence[float], robot_map: RobotMap) -> Stretch:

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.stretches import Stretch, alignment_error, common
-from mapweave.fusion.align import align_robots
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.maps import Alignment
 
 Outcome = Literal["joined right", "joined wrong", "ambiguous", "refused"]
@@ -100,10 +100,10 @@ def choose_pairs(
     return within + across
 
 
-def compare(first: Stretch, second: Stretch) -> Pair:
+def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None = None) -> Pair:
     """Align the maps of two stretches as robots do, and judge what comes of it."""
     start = time.perf_counter()
-    alignments = align_robots(first.robot_map, second.robot_map)
+    alignments = align(first.robot_map, second.robot_map, parameters)
     seconds = time.perf_counter() - start
     return Pair(
         first.name,
@@ -116,10 +116,15 @@ def compare(first: Stretch, second: Stretch) -> Pair:
     )
 
 
+def is_right(distance: float, turn: float) -> bool:
+    """Tell whether an alignment that is off by `distance` [m] and `turn` [rad] is right."""
+    return distance <= RIGHT_DISTANCE and turn <= RIGHT_TURN
+
+
 def _judge(first: Stretch, second: Stretch, alignment: Alignment) -> Match:
     reference, other = first.parts[alignment.reference], second.parts[alignment.other]
     distance, turn = math.inf, math.pi
     if first.log.building == second.log.building:
         distance, turn = alignment_error(reference, other, alignment.transform)
-    right = distance <= RIGHT_DISTANCE and turn <= RIGHT_TURN
+    right = is_right(distance, turn)
     return Match(alignment, distance, turn, (reference.bend, other.bend), right)

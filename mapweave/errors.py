@@ -50,3 +50,30 @@ class MissingExtraError(MapweaveError):
     def __init__(self, need: str, extra: str) -> None:
         super().__init__(f"{need} needs an optional package: pip install 'mapweave[{extra}]'")
         self.extra = extra
+
+
+class ArgumentError(MapweaveError, ValueError):
+    """An argument that cannot be used.
+
+    Parameters
+    ----------
+    argument
+        Its name.
+    problem
+        What was expected, and what was given.
+    """
+
+    def __init__(self, argument: str, problem: str) -> None:
+        super().__init__(f"{argument}: {problem}")
+        self.argument = argument
+        self.problem = problem
+
+
+class FinishedError(MapweaveError):
+    """A scan for a map that was finished before."""
+
+    def __init__(self, robot: str) -> None:
+        super().__init__(
+            f"the map of robot {robot!r} is finished and takes no more scans; expected a new Mapper"
+        )
+        self.robot = robot

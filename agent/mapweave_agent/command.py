@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from mapweave.cli import Command, argument, positive
-from mapweave.fusion.align import align_robots
+from mapweave.fusion.align import align
 from mapweave.ids import check_id
 from mapweave.io.scan_range import ScanRange
 from mapweave.mapping.mapper import Mapper, MapperParameters
@@ -65,7 +65,7 @@ def _run(options: argparse.Namespace) -> int:
 
     mapping = MapperParameters()
     with (
-        ComparisonWorker(align_robots) as comparer,
+        ComparisonWorker(align) as comparer,
         BackendProcess(mapping.backend) as backend,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):

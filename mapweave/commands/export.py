@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mapweave.cli import Command
 from mapweave.io.export import EXPORT_SUFFIXES, check_export_suffix, export
-from mapweave.io.map_files import read_any
+from mapweave.io.map_files import load
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +20,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     check_export_suffix(options.output)
-    export(read_any(options.map), options.output)
+    export(load(options.map), options.output)
     return 0
 
 

@@ -8,12 +8,11 @@ from mapweave.atomic import check_outputs
 from mapweave.cli import Command
 from mapweave.commands.progress import track
 from mapweave.errors import FileError
-from mapweave.fusion.align import align_robots
-from mapweave.io.map_files import read_map, write_joint
+from mapweave.fusion.align import align
+from mapweave.io.map_files import read_map, save
 from mapweave.maps import Alignment, JointMap, RobotMap, parse_component
-from mapweave.pictures.picture import check_picture_suffix, draw_joint
-from mapweave.team.joint_map import build_team_map
-from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
+from mapweave.pictures.picture import check_picture_suffix, plot
+from mapweave.team.joint_map import fuse
 from mapweave.text import percent
 
 EXIT_NOT_ALL_JOINED = 3
@@ -32,11 +31,13 @@ def _run(options: argparse.Namespace) -> int:
     inputs = [options.first, *options.others]
     check_outputs([options.output, options.plot], inputs)
     maps = _read_distinct(inputs)
-    joint = fuse(list(maps.values()))
+    pairs = list(combinations(maps.values(), 2))
+    alignments = [a for first, second in track(pairs, "comparing") for a in align(first, second)]
+    joint = fuse(list(maps.values()), alignments)
     if options.output:
-        write_joint(options.output, joint)
+        save(joint, options.output)
     if options.plot:
-        draw_joint(joint, options.plot, maps)
+        plot(joint, options.plot, maps)
     for line in tell(joint):
         print(line)  # noqa: T201
     return 0 if _all_robots_joined(joint, len(maps)) else EXIT_NOT_ALL_JOINED
@@ -54,17 +55,6 @@ def _read_distinct(paths: list[Path]) -> dict[str, RobotMap]:
             )
         maps[robot_map.robot] = robot_map
     return maps
-
-
-def fuse(maps: list[RobotMap]) -> JointMap:
-    """Compare all pairs of `maps` and join those that align."""
-    pairs = list(combinations(maps, 2))
-    alignments = [
-        a for first, second in track(pairs, "comparing") for a in align_robots(first, second)
-    ]
-    # Nothing grows any more, and there is no next time.
-    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1_000_000))
-    return build_team_map(maps, alignments, 1, weaver)
 
 
 def tell(joint: JointMap) -> list[str]:
@@ -95,4 +85,4 @@ def _all_robots_joined(joint: JointMap, robots: int) -> bool:
     )
 
 
-command = Command("Join robots' maps where their shapes prove it.", _configure, _run)
+command = Command("Join robots' maps where what both saw proves it.", _configure, _run)

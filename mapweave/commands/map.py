@@ -9,12 +9,12 @@ from mapweave.cli import Command, argument
 from mapweave.commands.progress import track
 from mapweave.errors import FileError
 from mapweave.ids import check_id
-from mapweave.io.map_files import write_map
+from mapweave.io.map_files import save
 from mapweave.io.readers import count_scans, read_scans
 from mapweave.io.scan_range import ScanRange
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
-from mapweave.pictures.picture import check_picture_suffix, draw_map
+from mapweave.pictures.picture import check_picture_suffix, plot
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
@@ -48,9 +48,9 @@ def _run(options: argparse.Namespace) -> int:
         options.log, options.robot, options.scans, odometry=options.odometry == "prior"
     )
     if options.output:
-        write_map(options.output, robot_map)
+        save(robot_map, options.output)
     if options.plot:
-        draw_map(robot_map, options.plot)
+        plot(robot_map, options.plot)
     print(_summary(robot_map, taken))  # noqa: T201
     return 0
 

@@ -1,6 +1,8 @@
 """Map fusion: the transform between two maps, or a reason why there is none (paper, VIII).
 
-Hypothesise by shape (H1, H2), align (V1), verify by what both maps saw (V2), decide. Where whole
+In the order of the paper: hypothesise (H1, H2: by shape, corners and parallel walls, all at once),
+align (V1), verify (V2: by all that both maps saw, free space included), decide. The loop as it is
+printed is `mapweave.fusion.reference`; docs/paper.md says what was changed and why. Where whole
 maps cannot be joined their parts are compared: maps may be bent. So an alignment of the right
 places is accepted only as far as it is right for the rest of the maps as well.
 """
@@ -46,10 +48,29 @@ class FusionParameters(BaseModel):
     min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
 
 
-def align_robots(
+def align(
     reference: RobotMap, other: RobotMap, parameters: FusionParameters | None = None
 ) -> list[Alignment]:
-    """Compare every component of `reference` with every one of `other`."""
+    """Compare every component of `reference` with every one of `other` (paper, VIII).
+
+    Parameters
+    ----------
+    reference, other
+        Maps of two robots, which need share nothing.
+    parameters
+        Of each stage.
+
+    Returns
+    -------
+    list of Alignment
+        One for each pair of components, accepted, ambiguous or refused: each says how sure it is,
+        and why.
+
+    Examples
+    --------
+    >>> align(RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ()))  # nothing in them
+    []
+    """
     p = parameters or FusionParameters()
     ours, theirs = ([_Component(m, c, p) for c in m.components] for m in (reference, other))
     return [_align(a, b, p) for a, b in itertools.product(ours, theirs)]
@@ -144,8 +165,8 @@ def compare(
     Parameters
     ----------
     possible
-        (n, 3) transforms of which one is near the right one, if that is known; without it, shapes
-        propose.
+        (n, 3) transforms of which one is near the right one, if that is known; without it, the
+        two maps propose.
     """
     if first is None or second is None:
         poor = ReasonKind.SMALL_REFERENCE if first is None else ReasonKind.SMALL_OTHER
@@ -171,7 +192,7 @@ def compare(
 def find_alignments(
     first: PreparedMap, second: PreparedMap, p: FusionParameters, possible: FloatArray | None = None
 ) -> list[Hypothesis]:
-    """Return the hypotheses that differ, best first; none where no shape proposes any."""
+    """Return the hypotheses that differ, best first; none where nothing proposes any."""
     transforms, _ = hypothesise(first, second, p.hypotheses, p.verification, possible)
     if len(transforms) == 0:
         return []

@@ -7,8 +7,8 @@ the way there, so an alignment of the right places may be wrong for maps as whol
 import math
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.spatial import KDTree
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -70,7 +70,7 @@ def _beyond(
     if not shared.any():
         return math.inf
     points = other.oriented.points
-    distance, _ = KDTree(points[shared]).query(points)
+    distance, _ = scipy.spatial.KDTree(points[shared]).query(points)
     return float(np.median(distance))
 
 

@@ -7,7 +7,7 @@ from mapweave.atomic import replace_file
 from mapweave.errors import FileError
 from mapweave.io.exporters.geojson import feature_collection
 from mapweave.maps import JointMap, RobotMap
-from mapweave.pictures.picture import PICTURE_SUFFIXES, draw_joint, draw_map
+from mapweave.pictures.picture import PICTURE_SUFFIXES, plot
 from mapweave.pictures.scene import Scene, joint_scenes, robot_scenes
 
 EXPORT_SUFFIXES = (*PICTURE_SUFFIXES, ".geojson")
@@ -34,7 +34,7 @@ def export(some_map: RobotMap | JointMap, path: str | Path) -> None:
     path = Path(path)
     check_export_suffix(path)
     if path.suffix.lower() in PICTURE_SUFFIXES:
-        _draw(some_map, path)
+        plot(some_map, path)
     else:
         _write_geojson(some_map, path)
 
@@ -48,13 +48,6 @@ def check_export_suffix(path: Path) -> None:
     if suffix in PLANNED_SUFFIXES:
         raise FileError(path, f"{suffix} cannot be written yet; there are {known}")
     raise FileError(path, f"expected its name to end in one of {known}")
-
-
-def _draw(some_map: RobotMap | JointMap, path: Path) -> None:
-    if isinstance(some_map, RobotMap):
-        draw_map(some_map, path)
-    else:
-        draw_joint(some_map, path)
 
 
 def _write_geojson(some_map: RobotMap | JointMap, path: Path) -> None:

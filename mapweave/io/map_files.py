@@ -55,7 +55,7 @@ def read_joint(path: str | Path) -> JointMap:
     return _check(source, _content(source), JointFile).to_map()
 
 
-def read_any(path: str | Path) -> RobotMap | JointMap:
+def load(path: str | Path) -> RobotMap | JointMap:
     """Return the robot map or joint map in the file at `path`, whichever its format says.
 
     Raises
@@ -68,6 +68,20 @@ def read_any(path: str | Path) -> RobotMap | JointMap:
     if _check(source, content, HeaderFile).format == MAP_FORMAT:
         return _check(source, content, MapFile).to_map()
     return _check(source, content, JointFile).to_map()
+
+
+def save(some_map: RobotMap | JointMap, path: str | Path) -> None:
+    """Write a robot's map or a joint map to `path`, as `load` reads it; whole or not at all.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    if isinstance(some_map, RobotMap):
+        write_map(path, some_map)
+    else:
+        write_joint(path, some_map)
 
 
 def write_map(path: str | Path, robot_map: RobotMap) -> None:

@@ -9,9 +9,9 @@ seen on the left, the next wall begins where this one ends.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 import shapely
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.spatial import KDTree
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -126,7 +126,7 @@ def neighbours(segments: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
     """Return pairs of segments, the end of the one within `reach` [m] of the other's start."""
     if not len(segments):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    ends, starts = KDTree(segments[:, 2:]), KDTree(segments[:, :2])
+    ends, starts = scipy.spatial.KDTree(segments[:, 2:]), scipy.spatial.KDTree(segments[:, :2])
     near = ends.sparse_distance_matrix(starts, reach, output_type="ndarray")
     a, b = near["i"].astype(np.int64), near["j"].astype(np.int64)
     return a[a != b], b[a != b]

@@ -5,12 +5,12 @@ histogram modulo 2 pi keeps the visible sides apart and serves rotation hypothes
 """
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import find_peaks
 
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arguments import as_segments, as_values
+from mapweave.geometry.arrays import FloatArray, IntArray
 
 LINE_PERIOD = np.pi
 DIRECTED_PERIOD = 2 * np.pi
@@ -73,12 +73,12 @@ def direction_histogram(
     angles, lengths = _angles_and_lengths(segments)
     index = np.rint(angles * bins / period).astype(np.int64) % bins
     raw = np.bincount(index, lengths if weights is None else weights, minlength=bins)
-    return np.asarray(gaussian_filter1d(raw, smoothing * bins / period, mode="wrap"))
+    return np.asarray(scipy.ndimage.gaussian_filter1d(raw, smoothing * bins / period, mode="wrap"))
 
 
 def main_directions(
-    segments: FloatArray,
-    weights: FloatArray | None = None,
+    segments: ArrayLike,
+    weights: ArrayLike | None = None,
     parameters: DirectionParameters | None = None,
 ) -> FloatArray:
     """Return the main directions: significant peaks of the direction histogram (paper, VI-A).
@@ -86,9 +86,9 @@ def main_directions(
     Parameters
     ----------
     segments
-        (n, 4) x1 y1 x2 y2 [m].
+        (n, 4) x1 y1 x2 y2 [m], or (n, 2) the vertices of one polyline [m].
     weights
-        (n,) what each contributes; by default its length [m].
+        (n,) what each segment contributes; by default its length [m].
     parameters
         What a significant peak is.
 
@@ -96,13 +96,24 @@ def main_directions(
     -------
     FloatArray
         (k,) angles [rad] in [0, pi), ascending; empty where no direction stands out.
+
+    Raises
+    ------
+    ArgumentError
+        If `segments` or `weights` has another shape, or holds NaN or infinity.
+
+    Examples
+    --------
+    >>> np.degrees(main_directions([[0, 0], [5, 0], [5, 3], [0, 3]]))
+    array([ 0., 90.])
     """
     chosen = parameters or DirectionParameters()
-    histogram = direction_histogram(segments, weights, bins=chosen.bins, smoothing=chosen.smoothing)
+    given = as_segments("segments", segments)
+    angles, lengths = _angles_and_lengths(given)
+    mass = lengths if weights is None else as_values("weights", weights, len(given), "segment")
+    histogram = direction_histogram(given, mass, bins=chosen.bins, smoothing=chosen.smoothing)
     if not histogram.any():
         return np.empty(0)
-    angles, lengths = _angles_and_lengths(segments)
-    mass = lengths if weights is None else weights
     rough = _significant_peaks(histogram, chosen) * LINE_PERIOD / chosen.bins
     fine = [_mean_about(peak, angles, mass, 2 * chosen.smoothing) for peak in rough]
     return np.sort(np.mod(fine, LINE_PERIOD))
@@ -186,12 +197,36 @@ def _significant_peaks(histogram: FloatArray, parameters: DirectionParameters) -
     """Return the bins that stand out of the level of a uniform histogram and of their valleys."""
     bins = len(histogram)
     around = np.tile(histogram, 3)  # no peak is cut at the ends, no valley missed
-    peaks, found = find_peaks(
-        around, height=parameters.significance * histogram.mean(), prominence=0.0
-    )
-    deep = found["prominences"] >= parameters.separation * found["peak_heights"]
+    peaks = local_maxima(around)
+    peaks = peaks[around[peaks] >= parameters.significance * histogram.mean()]
+    deep = prominences(around, peaks) >= parameters.separation * around[peaks]
     once = (peaks >= bins) & (peaks < 2 * bins)
     return np.asarray(peaks[deep & once] - bins, dtype=np.float64)
+
+
+def local_maxima(values: FloatArray) -> IntArray:
+    """Return (k,) where `values` (n,) are higher than on both sides; the middle of a plateau."""
+    edges = np.flatnonzero(values[1:] != values[:-1])
+    first, last = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(values) - 1]])
+    level = values[first]
+    higher = (level[1:-1] > level[:-2]) & (level[1:-1] > level[2:])
+    middle: IntArray = (first[1:-1][higher] + last[1:-1][higher]) // 2
+    return middle
+
+
+def prominences(values: FloatArray, peaks: IntArray) -> FloatArray:
+    """Return (k,) how far `peaks` (k,) stand out of the higher one of the valleys beside them.
+
+    A valley reaches from the peak to the next place that is higher than the peak, or to the end.
+    """
+    depths = np.empty(len(peaks))
+    for k, peak in enumerate(peaks.tolist()):
+        higher = np.flatnonzero(values > values[peak])
+        at = int(np.searchsorted(higher, peak))
+        start = higher[at - 1] + 1 if at else 0
+        end = higher[at] if at < len(higher) else len(values)
+        depths[k] = values[peak] - max(values[start : peak + 1].min(), values[peak:end].min())
+    return depths
 
 
 def _mean_about(peak: float, angles: FloatArray, mass: FloatArray, reach: float) -> float:

@@ -4,6 +4,9 @@ Always the cheapest pair is merged next, until none is cheap enough;
 `mapweave.lines.merging_rules` has the
 rules. Each segment weighs the total length observed, not its own length as in the paper, so that
 a well-known wall stays where it is.
+
+Neither step sees polylines. The paper hands corresponding polylines to both; here any two segments
+are a pair that are near, show the same face and are cheap, and polylines are made of the result.
 """
 
 import heapq

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
+from mapweave.errors import ArgumentError
+from mapweave.geometry.arguments import as_numbers, as_segments, as_values
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray
 
 _ORTHOGONAL = 1e-9  # cosines below count as zero: sqrt of the rounding of a product
@@ -181,9 +183,9 @@ def merged_segments(pairs: Pairs, direction: ComplexArray, end_noise: float = 0.
     )
 
 
-def merging_cost(
-    first: FloatArray,
-    second: FloatArray,
+def merge_cost(
+    first: ArrayLike,
+    second: ArrayLike,
     direction: ArrayLike | None = None,
     *,
     first_weight: ArrayLike | None = None,
@@ -195,7 +197,8 @@ def merging_cost(
     Parameters
     ----------
     first, second
-        (k, 4) x1 y1 x2 y2 [m]; the way they are directed does not matter.
+        (k, 4) x1 y1 x2 y2 [m], or (4,) for one; `first` may be one for all. The way they are
+        directed does not matter.
     direction
         (k,) or one: the direction ad [rad] that the merged segment shall have; by default the
         weighted average direction.
@@ -208,14 +211,24 @@ def merging_cost(
     -------
     FloatArray
         (k,) [m]; infinite where `direction` is orthogonal to one of the segments.
+
+    Raises
+    ------
+    ArgumentError
+        If segments have another shape, or are not as many, or anything given is NaN or infinite.
+
+    Examples
+    --------
+    >>> merge_cost([[0, 0, 3, 0]], [[0, 0.1, 3, 0.1]])  # w2 · 0.1 m + w3 · 0.1 m
+    array([0.075])
     """
-    pairs = Pairs.of(first, second, first_weight, second_weight)
+    pairs = _given_pairs(first, second, first_weight, second_weight)
     return cost_terms(pairs, _direction_of(pairs, direction)).total(balance or CostWeights())
 
 
-def merge(
-    first: FloatArray,
-    second: FloatArray,
+def merged_segment(
+    first: ArrayLike,
+    second: ArrayLike,
     direction: ArrayLike | None = None,
     *,
     first_weight: ArrayLike | None = None,
@@ -223,16 +236,47 @@ def merge(
 ) -> FloatArray:
     """Return the (k, 4) merged segments ms(L1, L2, ad) [m], directed as `first` (paper, VII).
 
-    Parameters as for `merging_cost`.
+    Parameters and errors as for `merge_cost`.
+
+    Examples
+    --------
+    >>> merged_segment([[0, 0, 3, 0]], [[2, 0.2, 5, 0.2]]).round(6)
+    array([[0. , 0.1, 5. , 0.1]])
     """
-    pairs = Pairs.of(first, second, first_weight, second_weight)
+    pairs = _given_pairs(first, second, first_weight, second_weight)
     return merged_segments(pairs, _direction_of(pairs, direction))
+
+
+def _given_pairs(
+    first: ArrayLike,
+    second: ArrayLike,
+    first_weight: ArrayLike | None,
+    second_weight: ArrayLike | None,
+) -> Pairs:
+    """Return pairs of what a caller gives; ArgumentError if it is no pairs of segments."""
+    ours, theirs = (
+        as_segments(name, np.atleast_2d(as_numbers(name, value, "expected (k, 4) segments [m]")))
+        for name, value in (("first", first), ("second", second))
+    )
+    if len(ours) not in (1, len(theirs)):
+        raise ArgumentError("second", f"expected {len(ours)}, as many as first, got {len(theirs)}")
+    weights = (
+        None if value is None else _one_each(name, value, len(theirs))
+        for name, value in (("first_weight", first_weight), ("second_weight", second_weight))
+    )
+    return Pairs.of(ours, theirs, *weights)
+
+
+def _one_each(argument: str, value: ArrayLike, count: int) -> FloatArray:
+    """Return (count,) of what may be given as one for all."""
+    given = as_numbers(argument, value, f"expected ({count},) numbers, or one")
+    return as_values(argument, np.full(count, given) if given.ndim == 0 else given, count, "pair")
 
 
 def _direction_of(pairs: Pairs, direction: ArrayLike | None) -> ComplexArray:
     if direction is None:
         return pairs.mean_direction
-    return np.asarray(np.exp(1j * np.asarray(direction, dtype=float)))
+    return np.asarray(np.exp(1j * _one_each("direction", direction, len(pairs.cosines))))
 
 
 def _end_points(segments: FloatArray) -> ComplexArray:

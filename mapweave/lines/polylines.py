@@ -15,13 +15,47 @@ the shortest list whenever the first assignment has no circle.
 """
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import min_weight_full_bipartite_matching
-from scipy.spatial import KDTree
+import scipy
+from numpy.typing import ArrayLike
 
+from mapweave.geometry.arguments import as_positive, as_segments
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 
 NONE = -1
+MAX_GAP = 0.5  # [m] within a polyline: half of a door
+
+
+def generalized_polylines(segments: ArrayLike, max_gap: float = MAX_GAP) -> list[FloatArray]:
+    """Return the generalized polylines that directed segments form (paper, V).
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], any frame, the visible side on the left; or (n, 2) vertices [m].
+    max_gap
+        The longest distance from one segment's end to the next one's start within a polyline [m].
+
+    Returns
+    -------
+    list of FloatArray
+        (k, 4) the segments of each, in order; that whose first segment comes first in the input
+        comes first.
+
+    Raises
+    ------
+    ArgumentError
+        If `segments` has another shape, or holds NaN or infinity, or `max_gap` is not above 0.
+
+    Examples
+    --------
+    >>> found = generalized_polylines([[0, 0, 2, 0], [9, 9, 9, 8], [2, 0.1, 2, 3]])
+    >>> [polyline.tolist() for polyline in found]
+    [[[0.0, 0.0, 2.0, 0.0], [2.0, 0.1, 2.0, 3.0]], [[9.0, 9.0, 9.0, 8.0]]]
+    """
+    given = as_segments("segments", segments)
+    order, polyline = group_polylines(given, as_positive("max_gap", max_gap, "m"))
+    starts = np.flatnonzero(np.diff(polyline)) + 1
+    return np.split(given[order], starts) if len(given) else []
 
 
 def group_polylines(segments: FloatArray, max_gap: float) -> tuple[IntArray, IntArray]:
@@ -62,7 +96,7 @@ def _possible_links(segments: FloatArray, max_gap: float) -> tuple[IntArray, Int
     """
     if not len(segments):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0)
-    ends, starts = KDTree(segments[:, 2:]), KDTree(segments[:, :2])
+    ends, starts = scipy.spatial.KDTree(segments[:, 2:]), scipy.spatial.KDTree(segments[:, :2])
     near = ends.sparse_distance_matrix(starts, max_gap, output_type="ndarray")
     source, target = near["i"].astype(np.int64), near["j"].astype(np.int64)
     other = source != target
@@ -89,8 +123,8 @@ def _cheapest_links(
     cost = np.concatenate([gap[link], np.full(n, max_gap)]) + 1.0
     rows = np.concatenate([source[link], nobody])
     columns = np.concatenate([target[link], n + nobody])
-    costs = csr_array((cost, (rows, columns)), shape=(n, 2 * n))
-    _, successor = min_weight_full_bipartite_matching(costs)
+    costs = scipy.sparse.csr_array((cost, (rows, columns)), shape=(n, 2 * n))
+    _, successor = scipy.sparse.csgraph.min_weight_full_bipartite_matching(costs)
     chosen: BoolArray = successor[source[link]] == target[link]
     return link[chosen]
 

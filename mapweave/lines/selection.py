@@ -9,8 +9,8 @@ nothing more, which is why no wall is doubled.
 """
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.sparse import csr_array
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.lines.sightings import Nearness, Sightings
@@ -61,7 +61,7 @@ def select(
     explains = explained(near, parameters)
     settled = explains | shadowed(near, parameters)
     # What a segment denies, being close in front of or behind it, counts against it.
-    worth = csr_array(
+    worth = scipy.sparse.csr_array(
         (
             np.where(explains, 1.0, -1.0)[settled],
             (near.segment[settled], near.sample[settled]),
@@ -85,7 +85,7 @@ def shadowed(near: Nearness, parameters: SelectionParameters) -> BoolArray:
     return np.asarray(inside & same & (np.abs(near.across) <= parameters.shadow))
 
 
-def _greedily(worth: csr_array, weights: FloatArray, price: float) -> IntArray:
+def _greedily(worth: "scipy.sparse.csr_array", weights: FloatArray, price: float) -> IntArray:
     """Take the row of the greatest worth, drop the columns it settles, and again."""
     of_sample = worth.T.tocsr()
     left = weights.copy()

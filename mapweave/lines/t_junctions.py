@@ -5,9 +5,9 @@ face or goes through it by no more than noise, is moved along its own line to th
 """
 
 import numpy as np
+import scipy
 import shapely
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.spatial import KDTree
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
@@ -66,5 +66,5 @@ def meet_walls(
 
 def _is_loose(ends: FloatArray, meeting: float) -> BoolArray:
     """Return (k,) which of the ends meet no other end."""
-    distance = np.asarray(KDTree(ends).query(ends, k=2)[0])
+    distance = np.asarray(scipy.spatial.KDTree(ends).query(ends, k=2)[0])
     return np.asarray(distance[:, 1] > meeting)

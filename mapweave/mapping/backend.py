@@ -1,7 +1,7 @@
 """Settling: what becomes of a submap once it is finished, beside the tracking of the next.
 
-Its component is joined to an older one where shapes prove it, loops are closed, its scans are
-refined against each other and against the walls that they saw again, and merged once more along
+Its component is joined to an older one where what both saw proves it, loops are closed, its scans
+are refined against each other and against the walls that they saw again, and merged once more along
 the better poses. The mapper adopts the outcome when the next submap is finished, at a defined
 scan, so a log gives the same map however long settling takes and wherever it runs.
 """

@@ -1,7 +1,7 @@
-"""Lost and found: a robot's components are joined as soon as their shapes prove it (paper, II).
+"""Lost and found: a robot's components are joined once what both saw proves it (paper, II).
 
 By the means by which two robots' maps are joined: a component is a map like any other. But most
-robots that lost track were not carried away. Where the shapes leave it open, a component is looked
+robots that lost track were not carried away. Where the maps leave it open, a component is looked
 for where the robot was when it lost track of the one before; what both saw decides as ever.
 """
 
@@ -70,7 +70,7 @@ class ComponentMerger:
     def reunite(
         self, submaps: Sequence[Submap], tracked: int = 1
     ) -> tuple[list[Submap], list[tuple[int, int]]]:
-        """Join components where the shapes prove it: the younger one becomes a part of the older.
+        """Join components where what both saw proves it, the younger one into the older one.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class ComponentMerger:
         ]
 
     def _joined(self, submaps: Sequence[Submap], older: int, younger: int) -> list[Submap] | None:
-        """Return `submaps` with two components as one, where their shapes prove it."""
+        """Return `submaps` with two components as one, where what both saw proves it."""
         walls = _wall(submaps, older), _wall(submaps, younger)
         if not self._is_due((older, younger), walls):
             return None
@@ -146,7 +146,7 @@ class ComponentMerger:
         return self._moved(submaps, older, younger, alignment.transform)
 
     def _compare(self, submaps: Sequence[Submap], older: int, younger: int) -> Alignment:
-        """Compare two components: by shape, and where that leaves it open, where track was lost."""
+        """Compare two components anywhere, and where that leaves it open, where track was lost."""
         first, second = self._shape(submaps, older), self._shape(submaps, younger)
         names, p = ("older", "younger"), self._p
         anywhere = compare(names[0], first, names[1], second, p.fusion)

@@ -4,10 +4,11 @@ Each scan becomes segments, is tracked, and is merged into the growing submap. A
 nowhere waits; when several in a row fit nowhere, the robot is lost and starts a new component.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from mapweave.errors import ArgumentError, FinishedError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
@@ -22,7 +23,7 @@ from mapweave.mapping.tracking.pose_covariance import (
 )
 from mapweave.mapping.tracking.tracker import Found, Tracker, TrackerParameters
 from mapweave.maps import LineMap, RobotMap, Submap
-from mapweave.scan.scan import Scan
+from mapweave.scan.scan import UNNUMBERED, Scan
 
 
 class MapperParameters(BaseModel):
@@ -65,12 +66,20 @@ class Placement:
 
 
 class Mapper:
-    """Maps the scans of one robot.
+    """Maps the scans of one robot, one by one.
+
+    Examples
+    --------
+    >>> mapper = Mapper("a")
+    >>> mapper.add(Scan.of([float("nan")] * 181, angle_min=-1.57, angle_increment=0.01745)).placed
+    False
+    >>> mapper.finish().submaps  # blind all the time
+    ()
 
     Parameters
     ----------
     robot, boot
-        The robot's id, and which run of it this is.
+        The robot's id, ``[a-z0-9][a-z0-9_-]{0,31}``, and which run of it this is.
     settling
         Settles finished submaps with the parameters given here, as by default it is done in
         between; the map is the same.
@@ -78,7 +87,7 @@ class Mapper:
 
     def __init__(
         self,
-        robot: str,
+        robot: str = "r1",
         boot: str = "0",
         parameters: MapperParameters | None = None,
         backend: BackendRunner | None = None,
@@ -97,10 +106,30 @@ class Mapper:
         self._unsettled = False  # whether the last finished submap is being settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
+        self._next_index = 0  # of scans that have no number, and the least of those that have
+        self._is_finished = False
 
     def add(self, scan: Scan) -> Placement:
-        """Take the next scan."""
-        seen = observe(scan, self.parameters.observation)
+        """Take the next scan.
+
+        Parameters
+        ----------
+        scan
+            One without an index is counted: it takes the number after that of the scan before it.
+
+        Returns
+        -------
+        Placement
+            What became of it.
+
+        Raises
+        ------
+        FinishedError
+            After `finish`.
+        ArgumentError
+            If its index is not above that of the scan before it.
+        """
+        seen = observe(self._numbered(scan), self.parameters.observation)
         if self._tracker.is_blind(seen):
             return Placement(False, self._component, False, False)  # blind: nothing to place
         finished = len(self._finished)
@@ -113,7 +142,13 @@ class Mapper:
         return Placement(placed, self._component, len(self._finished) > finished, lost)
 
     def finish(self) -> RobotMap:
-        """Finish the growing submap, as at the end of a log, and return the map."""
+        """Finish the growing submap, as at the end of a log, and return the map.
+
+        No scan can be added any more; the map can be asked for again.
+        """
+        if self._is_finished:
+            return self.robot_map()
+        self._is_finished = True
         self._merge_all(self._tracker.settle())
         if not self._growing.is_empty:
             self._finish_submap()
@@ -124,6 +159,18 @@ class Mapper:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap()]
         return RobotMap(self.robot, self.boot, self._version, (*self._finished, *growing))
+
+    def _numbered(self, scan: Scan) -> Scan:
+        """Return `scan` with its index, which may be the next; errors as of `add`."""
+        if self._is_finished:
+            raise FinishedError(self.robot)
+        index = self._next_index if scan.index == UNNUMBERED else scan.index
+        if index < self._next_index:
+            raise ArgumentError(
+                "scan", f"expected an index of {self._next_index} or more, got {index}"
+            )
+        self._next_index = index + 1
+        return replace(scan, index=index) if scan.index == UNNUMBERED else scan
 
     def _place(self, seen: Observation) -> bool:
         """Follow the robot to a scan; merge it, and those missed before it."""

@@ -8,7 +8,6 @@ does not fit them and the other closures gets no weight.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import gtsam
 import numpy as np
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
@@ -52,6 +51,8 @@ def optimise(
     fixed
         Which of them are kept, one at least.
     """
+    import gtsam  # here: who only tracks, reads or draws maps need not load the solver
+
     graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
     anchor = gtsam.noiseModel.Diagonal.Sigmas(np.array(ANCHOR_SIGMAS))
     for key, pose in enumerate(poses):

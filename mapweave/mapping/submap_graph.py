@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
@@ -140,8 +139,8 @@ class SubmapGraph:
         # Of two links between the same submaps the shorter one counts; a matrix would add them.
         shortest = {(first, second): w for w, first, second in reversed(used)}
         ends = np.array(list(shortest), dtype=np.int64).reshape(-1, 2)
-        graph = csr_array((list(shortest.values()), ends.T), shape=(count, count))
-        chains: FloatArray = dijkstra(graph, directed=False, indices=[submap])
+        graph = scipy.sparse.csr_array((list(shortest.values()), ends.T), shape=(count, count))
+        chains: FloatArray = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=[submap])
         return np.asarray(chains[0])
 
     def _fitted(self, submaps: Sequence[Submap], moved: BoolArray) -> list[Submap]:

@@ -8,8 +8,8 @@ is small enough to score every one of them, on a raster of nearness.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.ndimage import distance_transform_edt
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import Float32Array, FloatArray, IntArray
@@ -64,7 +64,7 @@ class LikelihoodField:
         index = index[((index >= 0) & (index < size)).all(axis=1)]
         empty = np.ones((size + 1, size + 1), dtype=np.bool_)
         empty[index[:, 0], index[:, 1]] = False
-        distance = distance_transform_edt(empty) * p.cell
+        distance = scipy.ndimage.distance_transform_edt(empty) * p.cell
         value = np.exp(-(distance**2) / (2 * p.nearness**2)).astype(np.float32)
         value[size, :] = value[:, size] = 0
         return cls(origin, centre.copy(), p.cell, value)

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.ndimage import distance_transform_edt
 
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from mapweave.maps import LineMap
@@ -78,7 +78,7 @@ class DistanceField:
         nearest, distance = _nearest_sample(oriented.points, low, cell, shape)
         free = fill_polygons(line_map.free_space, low, cell, shape)
         # The raster's rim is not free: what lies beyond was not looked at.
-        padded = distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
+        padded = scipy.ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
         depth = (padded * cell).astype(np.float32)
         return cls(oriented, weight, segment, low, cell, nearest, distance, depth)
 
@@ -147,5 +147,5 @@ def _nearest_sample(
     index = np.floor((points - origin) / cell).astype(np.int64)
     owner = np.full(tuple(shape), -1, dtype=np.int32)
     owner[index[:, 0], index[:, 1]] = np.arange(len(points))
-    distance, (rows, columns) = distance_transform_edt(owner < 0, return_indices=True)
+    distance, (rows, columns) = scipy.ndimage.distance_transform_edt(owner < 0, return_indices=True)
     return owner[rows, columns], (distance * cell).astype(np.float32)

@@ -18,8 +18,8 @@ the real part of Σ a conj(b):
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.fft import fft2, ifft2, next_fast_len
 
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray
 from mapweave.matching.distance_field import DistanceField
@@ -120,18 +120,21 @@ def correlate(
     turned = [other.turned(float(turn)) for turn in turns]
     span = reference.span + np.max([marks.span for marks in turned], axis=0)
     cell = max(p.cell, float(span.max()) / p.max_size)
-    shape = (next_fast_len(int(span[0] / cell) + 2), next_fast_len(int(span[1] / cell) + 2))
+    shape = (
+        scipy.fft.next_fast_len(int(span[0] / cell) + 2),
+        scipy.fft.next_fast_len(int(span[1] / cell) + 2),
+    )
     here = _Grid(reference.low, cell, shape)
-    first, second = (fft2(here.near(reference, k) / (2 * k)) for k in (1, 2))
-    third = fft2(here.worth(reference, weight / 2) + 1j * here.metres(reference))
+    first, second = (scipy.fft.fft2(here.near(reference, k) / (2 * k)) for k in (1, 2))
+    third = scipy.fft.fft2(here.worth(reference, weight / 2) + 1j * here.metres(reference))
     found = []
     for turn, marks in zip(turns, turned, strict=True):
         there = _Grid(marks.low, cell, shape)
-        spectrum = first * fft2(there.wall(marks, 1)).conj()
-        spectrum += second * fft2(there.wall(marks, 2)).conj()
+        spectrum = first * scipy.fft.fft2(there.wall(marks, 1)).conj()
+        spectrum += second * scipy.fft.fft2(there.wall(marks, 2)).conj()
         opposite = there.metres(marks) + 1j * there.worth(marks, weight / 2)
-        spectrum += third * fft2(opposite).conj()
-        shift = _best_shifts(ifft2(spectrum).real, reference.span / cell, p.shifts)
+        spectrum += third * scipy.fft.fft2(opposite).conj()
+        shift = _best_shifts(scipy.fft.ifft2(spectrum).real, reference.span / cell, p.shifts)
         place = here.low - there.low + cell * shift
         found.append(np.column_stack([place, np.full(len(place), turn)]))
     return np.concatenate(found)

@@ -1,8 +1,12 @@
-"""Hypotheses: rigid transforms that the shapes of two maps propose (paper, VIII, H1 and H2).
+"""Hypotheses: rigid transforms that two maps propose (in the place of H1 and H2; paper, VIII).
 
-Salient windows of polylines, corners of walls, and parallel walls each propose transforms. All
-proposals are scored at once by what both maps saw; the best that differ are aligned, all at once,
-and scored again; the best that clearly differ are handed on.
+Salient windows of polylines (shape, as in the paper), corners of walls, and parallel walls each
+propose transforms. All proposals are scored at once by what both maps saw; the best that differ
+are aligned, all at once, and scored again; the best that clearly differ are handed on.
+
+The three overlap so far that shape is not what decides: without windows and corners the shifts of
+parallel walls still propose the right transform (``python -m benchmarks reference`` measures it;
+figures in docs/paper.md). The loop as the paper prints it is `mapweave.fusion.reference`.
 """
 
 from dataclasses import dataclass
@@ -81,7 +85,7 @@ def hypothesise(
     Parameters
     ----------
     proposals
-        (n, 3) all that is possible, where that is known; without it, shapes propose.
+        (n, 3) all that is possible, where that is known; without it, the two maps propose.
     """
     p = parameters
     if proposals is None:

@@ -3,15 +3,16 @@
 The paper extends ICP [5] to respect the correspondence of polylines. Here a point finds its
 partner among points with a like normal, seen from the same side, which rules out partners
 around corners and behind walls; and, where corresponding polylines are known, a pair on two
-that do not correspond does not pull. Distances are measured along the partner's normal, because
-a wall holds a point across it and not along it.
+that do not correspond does not pull. They are known where shapes have proposed the start, in
+tracking; fusion, loops and the predicted pose go by normals alone. Distances are measured along the
+partner's normal, because a wall holds a point across it and not along it.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.spatial import KDTree
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -58,12 +59,14 @@ class Target:
     """
 
     oriented: OrientedPoints
-    tree: KDTree
+    tree: "scipy.spatial.KDTree"
 
     @classmethod
     def of(cls, oriented: OrientedPoints, parameters: IcpParameters) -> "Target":
         """Index `surface`."""
-        return cls(oriented, KDTree(_features(oriented, parameters), balanced_tree=False))
+        return cls(
+            oriented, scipy.spatial.KDTree(_features(oriented, parameters), balanced_tree=False)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

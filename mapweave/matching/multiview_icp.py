@@ -9,10 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.sparse import coo_array, csc_array, diags_array, eye_array, kron
-from scipy.sparse.linalg import spsolve
-from scipy.spatial import KDTree
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
@@ -126,7 +124,7 @@ def _pair(
     known = join_points([moving, walls])
     whose = np.concatenate([owner, np.full(len(walls), STAYS)])
     features = np.hstack([known.points, p.normal_weight * known.normals])
-    distance, index = KDTree(features, balanced_tree=False).query(
+    distance, index = scipy.spatial.KDTree(features, balanced_tree=False).query(
         features[: len(moving)], k=p.partners + 1, distance_upper_bound=3 * scale
     )
     point, rank = np.nonzero(np.isfinite(distance))
@@ -142,20 +140,24 @@ def _pair(
 
 
 def _step(
-    pairs: _Pairs, poses: FloatArray, held: csc_array, off: FloatArray, p: MultiviewIcpParameters
+    pairs: _Pairs,
+    poses: FloatArray,
+    held: "scipy.sparse.csc_array",
+    off: FloatArray,
+    p: MultiviewIcpParameters,
 ) -> FloatArray:
     """(n, 3) by which the poses move: a Gauss-Newton step.
 
     `off` (n, 3) is how far they are from where tracking, of normal matrix `held`, put them.
     """
     jacobian = _derivatives(pairs, pairs.scan, poses) - _derivatives(pairs, pairs.other, poses)
-    weighted = jacobian.T @ diags_array(pairs.weight / p.noise**2)
+    weighted = jacobian.T @ scipy.sparse.diags_array(pairs.weight / p.noise**2)
     pull = weighted @ pairs.residual + held @ off.ravel()
-    step = spsolve(csc_array(weighted @ jacobian + held), -pull)
+    step = scipy.sparse.linalg.spsolve(scipy.sparse.csc_array(weighted @ jacobian + held), -pull)
     return np.asarray(step).reshape(-1, 3)
 
 
-def _derivatives(pairs: _Pairs, whose: IntArray, poses: FloatArray) -> csc_array:
+def _derivatives(pairs: _Pairs, whose: IntArray, poses: FloatArray) -> "scipy.sparse.csc_array":
     """(k, 3n) of the residuals by the poses of `whose` (k,) points move; what stays has none."""
     moves = np.flatnonzero(whose != STAYS)
     arm = pairs.point[moves] - poses[whose[moves], :2]
@@ -164,16 +166,20 @@ def _derivatives(pairs: _Pairs, whose: IntArray, poses: FloatArray) -> csc_array
     value = np.column_stack([normal, turning])
     column = 3 * whose[moves, None] + np.arange(3)
     entries = value.ravel(), (np.repeat(moves, 3), column.ravel())
-    return csc_array(coo_array(entries, shape=(len(whose), 3 * len(poses))))
+    return scipy.sparse.csc_array(
+        scipy.sparse.coo_array(entries, shape=(len(whose), 3 * len(poses)))
+    )
 
 
-def _tracking(n: int, p: MultiviewIcpParameters) -> csc_array:
+def _tracking(n: int, p: MultiviewIcpParameters) -> "scipy.sparse.csc_array":
     """(3n, 3n) normal matrix of the n - 1 tracked steps and of the first pose.
 
     Of small corrections in the common frame: neighbours move and turn alike.
     """
-    steps = eye_array(n) - eye_array(n, k=-1)
+    steps = scipy.sparse.eye_array(n) - scipy.sparse.eye_array(n, k=-1)
     sigmas = np.tile([p.step_sigma, p.step_sigma, p.turn_sigma], (n, 1))
     sigmas[0] = [p.start_sigma, p.start_sigma, p.start_turn]
-    difference = csc_array(kron(steps, eye_array(3)))
-    return csc_array(difference.T @ diags_array(sigmas.ravel() ** -2) @ difference)
+    difference = scipy.sparse.csc_array(scipy.sparse.kron(steps, scipy.sparse.eye_array(3)))
+    return scipy.sparse.csc_array(
+        difference.T @ scipy.sparse.diags_array(sigmas.ravel() ** -2) @ difference
+    )

@@ -15,6 +15,38 @@ from mapweave.pictures.scene import Scene, joint_scenes, robot_of, robot_scenes,
 PICTURE_SUFFIXES = (".svg", ".png")
 
 
+def plot(
+    some_map: RobotMap | JointMap,
+    path: str | Path,
+    maps: Mapping[str, RobotMap] | None = None,
+    title: str | None = None,
+) -> None:
+    """Draw a robot's map, as `draw_map` does, or a joint map, as `draw_joint` does.
+
+    Parameters
+    ----------
+    some_map
+        The map.
+    path
+        The file to write, ``.svg`` or ``.png``; whole or not at all.
+    maps
+        Robot id to robot map: in a joint map they add the paths.
+    title
+        Its headline; names the robot or the version by default.
+
+    Raises
+    ------
+    FileError
+        If `path` has another suffix or cannot be written.
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    if isinstance(some_map, RobotMap):
+        draw_map(some_map, path, title)
+    else:
+        draw_joint(some_map, path, maps, title)
+
+
 def draw_map(robot_map: RobotMap, path: str | Path, title: str | None = None) -> None:
     """Draw a robot's map: walls by support, free space beneath, the path with its start.
 

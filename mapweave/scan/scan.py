@@ -1,35 +1,131 @@
-"""A scan: one sweep of ranges."""
+"""A scan: one sweep of ranges, checked when it is made."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from mapweave.errors import ArgumentError
+from mapweave.geometry.arguments import as_numbers
 from mapweave.geometry.arrays import BoolArray, FloatArray
+
+UNNUMBERED = -1
+"""The index of a scan that belongs to no log: who maps it counts."""
+
+_TURN = 2 * math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scan:
     """One sweep of a 2D laser, in the sensor's frame: x ahead, y to the left.
 
+    Ranges and angles may be given as lists, and clockwise, as some sensors turn: they are turned
+    round. What is kept is ascending, and cannot be written to.
+
     Attributes
     ----------
+    ranges
+        (n,) measured distances [m]; NaN where nothing came back, which may be given as NaN,
+        infinity, zero or a negative number.
+    angles
+        (n,) beam directions [rad], counter-clockwise: strictly ascending, evenly spaced as a
+        laser's are, over one turn at the most. The last beam of a full turn may look where the
+        first did.
     index
-        Which scan of its log, from 0.
+        Which scan of its log, from 0; `UNNUMBERED`, -1, where there is no log: `Mapper` counts.
     stamp
         When it was taken [s]; NaN where the log gives no usable time.
-    angles
-        (n,) beam directions [rad], strictly ascending (counter-clockwise).
-    ranges
-        (n,) measured distances [m]; NaN where nothing came back.
     odometry
-        The robot's own guess of its pose [m, m, rad], only where it was asked for.
+        (3,) the robot's own guess of its pose [m, m, rad], only where it was asked for.
+
+    Raises
+    ------
+    ArgumentError
+        If ranges and angles are not of one length, or angles are not as above.
+
+    Examples
+    --------
+    >>> Scan([1.0, 1.1, float("inf")], [-0.1, 0.0, 0.1]).hits.tolist()
+    [True, True, False]
+    >>> Scan([1.0, 2.0], [0.5, -0.5]).ranges.tolist()  # clockwise
+    [2.0, 1.0]
     """
 
-    index: int
-    stamp: float
-    angles: FloatArray
     ranges: FloatArray
+    angles: FloatArray
+    index: int = UNNUMBERED
+    stamp: float = math.nan
     odometry: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Check and keep what was given."""
+        ranges = as_numbers("ranges", self.ranges, "expected (n,) distances [m]")
+        angles = as_numbers("angles", self.angles, "expected (n,) directions [rad]")
+        if ranges.ndim != 1:
+            raise ArgumentError("ranges", f"expected (n,) distances [m], got shape {ranges.shape}")
+        if angles.shape != ranges.shape:
+            raise ArgumentError(
+                "angles", f"expected ({len(ranges)},), one a range, got shape {angles.shape}"
+            )
+        if len(angles) > 1 and angles[0] > angles[-1]:
+            ranges, angles = ranges[::-1], angles[::-1]
+        _check_directions(angles)
+        keep = object.__setattr__  # the values are the class's own from here on
+        keep(self, "ranges", _read_only(np.where((ranges > 0) & (ranges < np.inf), ranges, np.nan)))
+        keep(self, "angles", _owned(angles))
+        if self.odometry is not None:
+            keep(self, "odometry", _pose("odometry", self.odometry))
+
+    @classmethod
+    def of(
+        cls,
+        ranges: ArrayLike,
+        angle_min: float,
+        angle_increment: float,
+        *,
+        range_min: float = 0.0,
+        range_max: float = math.inf,
+        index: int = UNNUMBERED,
+        stamp: float = math.nan,
+        odometry: ArrayLike | None = None,
+    ) -> "Scan":
+        """Return a scan from what drivers state, such as a ROS ``LaserScan``.
+
+        Parameters
+        ----------
+        ranges
+            (n,) [m]; NaN, infinity, zero or a negative number where nothing came back.
+        angle_min
+            Direction of the first beam [rad].
+        angle_increment
+            From each beam to the next [rad]; negative for a sensor that turns clockwise.
+        range_min, range_max
+            [m] readings below or above are no returns.
+        index, stamp, odometry
+            As of `Scan`.
+
+        Raises
+        ------
+        ArgumentError
+            If the angles are not finite, the increment is zero, or the beams go round more than
+            once.
+
+        Examples
+        --------
+        >>> Scan.of([2.0, 2.0, 9.9], angle_min=0.1, angle_increment=-0.1, range_max=9.0).ranges
+        array([nan,  2.,  2.])
+        """
+        for name, value in (("angle_min", angle_min), ("angle_increment", angle_increment)):
+            if not math.isfinite(value):
+                raise ArgumentError(name, f"expected a finite angle [rad], got {value}")
+        if angle_increment == 0:
+            raise ArgumentError("angle_increment", "expected an angle [rad] other than 0")
+        given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
+        used = np.where((given >= range_min) & (given <= range_max), given, np.nan)
+        angles = angle_min + angle_increment * np.arange(given.size, dtype=np.float64)
+        pose = None if odometry is None else _pose("odometry", odometry)
+        return cls(used, angles, index, stamp, pose)
 
     @property
     def hits(self) -> BoolArray:
@@ -42,3 +138,52 @@ class Scan:
         bearing = np.column_stack([np.cos(self.angles), np.sin(self.angles)])
         points: FloatArray = self.ranges[:, None] * bearing
         return points
+
+
+def _check_directions(angles: FloatArray) -> None:
+    """Raise ArgumentError unless `angles` (n,) [rad] ascend within a turn."""
+    if len(angles) < 2:
+        if not np.isfinite(angles).all():
+            raise ArgumentError("angles", "expected finite directions [rad], got NaN or infinity")
+        return
+    steps = angles[1:] - angles[:-1]
+    if not (steps > 0).all():  # so it is where one of them is NaN
+        _refuse_directions(angles)
+    span = float(angles[-1] - angles[0])
+    # A turn of beams whose stated increment was rounded may end up to a beam late.
+    if not span <= _TURN + span / (len(angles) - 1) * (1 + 1e-6):
+        raise ArgumentError(
+            "angles", f"expected one turn at the most, 2 pi, got {span:.4f} rad from end to end"
+        )
+
+
+def _refuse_directions(angles: FloatArray) -> None:
+    """Raise ArgumentError that says why `angles` (n,) do not ascend."""
+    if not np.isfinite(angles).all():
+        first = int(np.flatnonzero(~np.isfinite(angles))[0])
+        raise ArgumentError(
+            "angles", f"expected finite directions [rad], got {angles[first]} for beam {first}"
+        )
+    raise ArgumentError(
+        "angles",
+        "expected directions [rad] that ascend from beam to beam, or descend, and do not jump at"
+        " half a turn",
+    )
+
+
+def _pose(argument: str, value: ArrayLike) -> FloatArray:
+    """Return (3,) `value`; ArgumentError if it is no pose."""
+    pose = as_numbers(argument, value, "expected (3,) x, y, theta [m, m, rad]")
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        raise ArgumentError(argument, f"expected (3,) finite x, y, theta [m, m, rad], got {pose}")
+    return pose
+
+
+def _owned(values: FloatArray) -> FloatArray:
+    """Return `values` that nobody else writes to: themselves where nobody can."""
+    return _read_only(values.copy()) if values.flags.writeable else values
+
+
+def _read_only(values: FloatArray) -> FloatArray:
+    values.setflags(write=False)
+    return values

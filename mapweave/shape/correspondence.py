@@ -2,8 +2,9 @@
 
 Position plays no part: windows of polylines that have the same shape propose rigid motions, and
 the pairs of polylines that agree in one are corresponding. Windows are parts of polylines, so a
-wall that is seen in part, or has grown since, corresponds all the same. That is how a scan is
-found again after a jump.
+wall that is seen in part, or has grown since, corresponds all the same. That is one way in which a
+scan is found again after a jump; tracking tries it before it searches every motion in a window,
+which finds a kidnapped robot without it as well (docs/paper.md).
 """
 
 from dataclasses import dataclass

@@ -22,8 +22,10 @@ too, so both integrals are finite sums over the merged breakpoints of C and D.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mapweave.errors import MapweaveError
+from mapweave.geometry.arguments import as_segments
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.se2 import wrap
 
@@ -66,20 +68,27 @@ class TangentSpace:
         return self.angle[np.clip(step, 0, len(self.angle) - 1)]
 
 
-def tangent_space(polyline: FloatArray) -> TangentSpace:
+def tangent_space(polyline: ArrayLike) -> TangentSpace:
     """Return T(P) of a generalized polyline (paper, VIII-A).
 
     Parameters
     ----------
     polyline
-        (n, 4) x1 y1 x2 y2 [m], any frame, in order. Segments without length have no direction and
-        are passed over.
+        (n, 4) x1 y1 x2 y2 [m] or (n, 2) vertices [m], any frame, in order. Segments without length
+        have no direction and are passed over.
 
     Raises
     ------
+    ArgumentError
+        If it has another shape, or holds NaN or infinity.
     NoShapeError
         If no segment has any length.
     """
+    return _tangent_space(as_segments("polyline", polyline))
+
+
+def _tangent_space(polyline: FloatArray) -> TangentSpace:
+    """Return T(P) of (n, 4) segments."""
     steps = polyline[:, 2:] - polyline[:, :2]
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     steps, lengths = steps[lengths > 0], lengths[lengths > 0]
@@ -92,13 +101,13 @@ def tangent_space(polyline: FloatArray) -> TangentSpace:
     return TangentSpace(float(arc[-1]), arc / arc[-1], angle)
 
 
-def similarity(c: FloatArray, d: FloatArray) -> tuple[float, float]:
+def similarity(c: ArrayLike, d: ArrayLike) -> tuple[float, float]:
     """Return the shape similarity measure of two polylines and the best rotation (paper, VIII-A).
 
     Parameters
     ----------
     c, d
-        (n, 4) and (m, 4) x1 y1 x2 y2 [m], each in any frame.
+        (n, 4) and (m, 4) x1 y1 x2 y2 [m], or (n, 2) vertices [m], each in any frame.
 
     Returns
     -------
@@ -109,10 +118,18 @@ def similarity(c: FloatArray, d: FloatArray) -> tuple[float, float]:
 
     Raises
     ------
+    ArgumentError
+        If one of them has another shape, or holds NaN or infinity.
     NoShapeError
         If one of them has no length.
+
+    Examples
+    --------
+    >>> s, theta = similarity([[0, 0], [2, 0], [2, 2]], [[5, 5], [5, 8], [2, 8]])
+    >>> round(s, 6), round(theta, 6)  # a corner, turned by a right angle
+    (0.0, 1.570796)
     """
-    first, second = tangent_space(c), tangent_space(d)
+    first, second = _tangent_space(as_segments("c", c)), _tangent_space(as_segments("d", d))
     breaks = np.union1d(first.breaks, second.breaks)
     middle, width = (breaks[1:] + breaks[:-1]) / 2, np.diff(breaks)
     difference = first.at(middle) - second.at(middle)
@@ -120,7 +137,7 @@ def similarity(c: FloatArray, d: FloatArray) -> tuple[float, float]:
     return float(width @ (difference + theta) ** 2), float(wrap(theta))
 
 
-def complexity(polyline: FloatArray) -> float:
+def complexity(polyline: ArrayLike) -> float:
     """Return the shape complexity sc(P) = s(P, L_P) [rad²] of a polyline (paper, VIII-B).
 
     L_P is a straight line of the same length. As T(L_P) is constant, sc(P) is the variance of
@@ -129,12 +146,21 @@ def complexity(polyline: FloatArray) -> float:
     Parameters
     ----------
     polyline
-        (n, 4) x1 y1 x2 y2 [m], any frame.
+        (n, 4) x1 y1 x2 y2 [m] or (n, 2) vertices [m], any frame.
 
     Raises
     ------
+    ArgumentError
+        If it has another shape, or holds NaN or infinity.
     NoShapeError
         If it has no length.
+
+    Examples
+    --------
+    >>> complexity([[0, 0], [7, 0]])
+    0.0
+    >>> round(complexity([[0, 0], [2, 0], [2, 2]]), 6)  # (π/4)²
+    0.61685
     """
     straight = np.array([[0.0, 0.0, tangent_space(polyline).length, 0.0]])
     return similarity(polyline, straight)[0]

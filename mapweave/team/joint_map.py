@@ -1,5 +1,6 @@
 """The joint map: components aligned along accepted alignments, and merged (paper, VI to VIII)."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
@@ -7,6 +8,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from shapely.geometry.base import BaseGeometry
 
+from mapweave.errors import ArgumentError
+from mapweave.fusion.align import align
 from mapweave.geometry.arrays import FloatArray
 from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.polylines import group_polylines
@@ -23,7 +26,7 @@ from mapweave.maps import (
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, unite
 from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster, cluster_components
-from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
 
 Weave: TypeAlias = Callable[[Cluster, Sequence[Alignment]], tuple[Cluster, Mapping[str, LineMap]]]
@@ -41,6 +44,60 @@ class JointParameters(BaseModel):
     raster: DistanceFieldParameters = DistanceFieldParameters()
     max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
     segments: SegmentConfidenceParameters = SegmentConfidenceParameters()
+
+
+def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None) -> JointMap:
+    """Return the joint map of robots whose maps are complete: nothing grows any more.
+
+    Parameters
+    ----------
+    maps
+        Of one robot each.
+    alignments
+        As of `mapweave.align`, of any of their pairs; by default all pairs are compared here.
+
+    Returns
+    -------
+    JointMap
+        Version 1. Alignments that contradict others are in it, and say so; maps that no
+        alignment joins stay components of their own.
+
+    Raises
+    ------
+    ArgumentError
+        If two maps are of one robot, or an alignment names a component that no map has.
+
+    Examples
+    --------
+    >>> fuse([RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ())]).components
+    ()
+    """
+    _check_robots(maps)
+    if alignments is None:
+        pairs = itertools.combinations(maps, 2)
+        alignments = [a for first, second in pairs for a in align(first, second)]
+    _check_components(maps, alignments)
+    # Nothing grows any more, and there is no next time.
+    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1_000_000))
+    return build_team_map(maps, alignments, 1, weaver)
+
+
+def _check_robots(maps: Sequence[RobotMap]) -> None:
+    robots = [m.robot for m in maps]
+    twice = sorted({robot for robot in robots if robots.count(robot) > 1})
+    if twice:
+        raise ArgumentError(
+            "maps", f"expected maps of different robots, got two of robot {twice[0]!r}"
+        )
+
+
+def _check_components(maps: Sequence[RobotMap], alignments: Sequence[Alignment]) -> None:
+    known = submaps_by_component(maps)
+    for name in (name for a in alignments for name in (a.reference, a.other)):
+        if name not in known:
+            raise ArgumentError(
+                "alignments", f"expected components of the maps, {', '.join(known)}; got {name!r}"
+            )
 
 
 def build_joint_map(

@@ -4,8 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
+import scipy
 
 from mapweave.geometry.arrays import IntArray
 from mapweave.team.cycles import Edge
@@ -37,8 +36,10 @@ class Cut:
 def groups(count: int, edges: Sequence[Edge], present: Iterable[int]) -> list[list[int]]:
     """Return the nodes that hang together by the edges `present`, each group ascending."""
     ends = np.array([(edges[k].first, edges[k].second) for k in present], dtype=int).reshape(-1, 2)
-    links = csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    number, labels = connected_components(links, directed=False)
+    links = scipy.sparse.csr_array(
+        (np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count)
+    )
+    number, labels = scipy.sparse.csgraph.connected_components(links, directed=False)
     return [np.flatnonzero(labels == label).tolist() for label in range(number)]
 
 
@@ -58,10 +59,10 @@ def weakest_cut(
     """
     place = {node: k for k, node in enumerate(nodes)}
     capacity = _capacities(place, edges, strengths)
-    flow = maximum_flow(capacity, place[first], place[second])
+    flow = scipy.sparse.csgraph.maximum_flow(capacity, place[first], place[second])
     left = capacity - flow.flow
     left.eliminate_zeros()
-    side = breadth_first_order(left, place[first], return_predecessors=False)
+    side = scipy.sparse.csgraph.breadth_first_order(left, place[first], return_predecessors=False)
     cut = Cut(0.0, frozenset(nodes[int(k)] for k in side))
     crossing = (v for k, v in strengths.items() if cut.parts(edges[k].first, edges[k].second))
     return Cut(sum(crossing), cut.side)
@@ -78,7 +79,7 @@ def weakest_cut_of_all(
 
 def _capacities(
     place: Mapping[int, int], edges: Sequence[Edge], strengths: dict[int, float]
-) -> csr_array:
+) -> "scipy.sparse.csr_array":
     """(n, n) how much flows from node to node, alike both ways."""
     table: IntArray = np.zeros((len(place), len(place)), dtype=np.int64)
     for k, strength in strengths.items():
@@ -86,4 +87,4 @@ def _capacities(
         first, second = place[edges[k].first], place[edges[k].second]
         table[first, second] += units
         table[second, first] += units
-    return csr_array(np.minimum(table, 2**30).astype(np.int32))
+    return scipy.sparse.csr_array(np.minimum(table, 2**30).astype(np.int32))

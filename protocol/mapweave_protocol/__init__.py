@@ -10,6 +10,17 @@ A team's maps in two lines::
 wants it, ``inbox`` reads what arrives, and ``asking`` puts questions to the coordinator.
 """
 
-from mapweave_protocol.link.subscriber import alignments, joint_maps, robot_maps, statuses
+from typing import TYPE_CHECKING
+
+from mapweave.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from mapweave_protocol.link.subscriber import alignments, joint_maps, robot_maps, statuses
+
+_SUBSCRIBER = "mapweave_protocol.link.subscriber"
+_MODULES = dict.fromkeys(("alignments", "joint_maps", "robot_maps", "statuses"), _SUBSCRIBER)
+
+if not TYPE_CHECKING:  # who checks types knows the names from above
+    __getattr__, __dir__ = lazy_names(__name__, _MODULES)
 
 __all__ = ["alignments", "joint_maps", "robot_maps", "statuses"]

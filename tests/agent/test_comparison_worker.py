@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from mapweave.fusion.align import align_robots
+from mapweave.fusion.align import align
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave_agent.comparison_schedule import Comparison
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
@@ -33,13 +33,13 @@ COMPARISON = Comparison("b", corner("a"), corner("b"))
 
 
 def test_what_comes_back_is_what_the_function_returns() -> None:
-    with ComparisonWorker(align_robots) as comparer:
+    with ComparisonWorker(align) as comparer:
         comparer.start(COMPARISON)
         assert comparer.busy
         outcome = outcome_of(comparer)
     assert not comparer.busy
     assert outcome.comparison is COMPARISON
-    (expected,) = align_robots(corner("a"), corner("b"))
+    (expected,) = align(corner("a"), corner("b"))
     assert outcome.alignments is not None
     (alignment,) = outcome.alignments
     assert (alignment.decision, alignment.reason) == (expected.decision, expected.reason)
@@ -55,7 +55,7 @@ def test_an_error_is_an_outcome_and_the_next_comparison_goes_on() -> None:
 
 
 def test_a_process_that_was_killed_is_an_outcome_and_is_replaced() -> None:
-    with ComparisonWorker(align_robots) as comparer:
+    with ComparisonWorker(align) as comparer:
         comparer.start(COMPARISON)
         os.kill(comparer.pid, signal.SIGKILL)
         outcomes = [outcome_of(comparer)]
@@ -66,7 +66,7 @@ def test_a_process_that_was_killed_is_an_outcome_and_is_replaced() -> None:
 
 
 def test_the_process_ends_with_its_context() -> None:
-    with ComparisonWorker(align_robots) as comparer:
+    with ComparisonWorker(align) as comparer:
         pid = comparer.pid
         os.kill(pid, 0)
         comparer.start(COMPARISON)

@@ -16,7 +16,7 @@ from mapweave_agent.source import NOMINAL_PERIOD, LogSource, ReplayClock, parse_
 def dues(stamps: list[float], rate: float = 1.0) -> list[float]:
     clock = ReplayClock(rate)
     nothing = np.empty(0)
-    return [clock.due(Scan(k, stamp, nothing, nothing)) for k, stamp in enumerate(stamps)]
+    return [clock.due(Scan(nothing, nothing, k, stamp)) for k, stamp in enumerate(stamps)]
 
 
 def test_scans_follow_each_other_as_their_stamps_say() -> None:

@@ -8,7 +8,7 @@ from mapweave.scan.scan import Scan
 
 
 def test_returns_beyond_twelve_metres_and_blind_beams_do_not_count() -> None:
-    scan = Scan(0, 0.0, np.array([-0.1, 0.0, 0.1]), np.array([np.nan, 11.0, 13.0]))
+    scan = Scan(np.array([np.nan, 11.0, 13.0]), np.array([-0.1, 0.0, 0.1]), 0, 0.0)
     points = returns_at([scan], np.array([[1.0, 2.0, np.pi / 2]]))
     np.testing.assert_allclose(points, [[1.0, 13.0]])
 

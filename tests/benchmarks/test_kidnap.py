@@ -64,7 +64,7 @@ def test_the_jump_is_farther_than_a_step_and_the_same_for_the_same_number() -> N
 
 def test_nothing_in_the_scans_tells_of_the_jump() -> None:
     """Indices ascend and none is used twice; time goes on."""
-    scans = [Scan(k, 0.1 * k, np.array([0.0]), np.array([1.0])) for k in range(SCANS)]
+    scans = [Scan(np.array([1.0]), np.array([0.0]), k, 0.1 * k) for k in range(SCANS)]
     after = list(after_the_jump(scans, 50))
     assert [scan.index for scan in after] == list(range(SCANS + 50, SCANS + 150))
     assert after[0].stamp == pytest.approx(scans[239].stamp)

@@ -41,7 +41,7 @@ def _look(world: World, seed: int) -> View:
 
 def _scan(index: int, ranges: FloatArray) -> Scan:
     returned = np.where(ranges < LIDAR.maximum_range, ranges, np.nan)
-    return Scan(index, float(index), LIDAR.angles, returned)
+    return Scan(returned, LIDAR.angles, index, float(index))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_only_a_guess_within_half_a_metre_and_five_degrees_in_one_building_is_ri
 
 def test_a_grid_is_wall_where_beams_end_free_where_they_pass_and_unknown_elsewhere() -> None:
     """Two beams almost along the axes, 2.04 m long, from a pose that is not at the origin."""
-    scan = Scan(0, 0.0, np.array([0.03, np.pi / 2 - 0.03]), np.array([2.04, 2.04]))
+    scan = Scan(np.array([2.04, 2.04]), np.array([0.03, np.pi / 2 - 0.03]), 0, 0.0)
     log = Log("", "", Path(), Path())
     grid = view("", log, [scan], np.array([[5.0, -3.0, 0.4]])).grid
 

@@ -2,6 +2,7 @@
 
 import re
 import stat
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,7 +19,10 @@ _MESSAGE_NAME = re.compile(rb"#|//|[A-Za-z][A-Za-z0-9_:]*\Z")
 
 
 def read_scans(
-    path: str | Path, *, odometry: bool = False, on_warning: Callable[[str], None]
+    path: str | Path,
+    *,
+    odometry: bool = False,
+    on_warning: Callable[[str], None] = warnings.warn,
 ) -> Iterator[Scan]:
     """Return the whole scans of a log, in the order of its lines, as they are read.
 
@@ -36,7 +40,8 @@ def read_scans(
         Fill `Scan.odometry` with the robot pose that the line states, where it is finite. (A log
         that another program has corrected states the corrected pose there, too.)
     on_warning
-        Called once, after the last scan, if damaged lines were left out.
+        Called once, after the last scan, if damaged lines were left out; by default a
+        `UserWarning` says so.
 
     Raises
     ------
@@ -159,7 +164,7 @@ def _scans(path: Path, odometry: bool, on_warning: Callable[[str], None]) -> Ite
 def _scan(index: int, record: LaserRecord, odometry: bool) -> Scan:
     usable = odometry and np.isfinite(record.robot_pose).all()
     guess = record.robot_pose if usable else None
-    return Scan(index, record.stamp, record.angles, record.ranges, guess)
+    return Scan(record.ranges, record.angles, index, record.stamp, guess)
 
 
 def parse_line(line: Line) -> LaserRecord | None:

@@ -9,7 +9,7 @@ from mapweave_deploy.run.occupancy import CELL, FREE, OCCUPIED, UNKNOWN, draw_gr
 def circle(radius: float) -> Scan:
     """Return a scan from the middle of a round room."""
     angles = np.linspace(-np.pi, np.pi, 2000)[1:]
-    return Scan(0, 0.0, angles, np.full(len(angles), radius))
+    return Scan(np.full(len(angles), radius), angles, 0, 0.0)
 
 
 def test_a_round_room_is_a_ring_of_occupied_cells_around_free_ones() -> None:

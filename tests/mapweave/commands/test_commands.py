@@ -166,7 +166,7 @@ def test_readings_that_are_none_count_as_no_return(
     assert (tmp_path / "odd.json").read_bytes() == (tmp_path / "plain.json").read_bytes()
 
 
-BLIND = flaser(Scan(0, 0.0, FRONT, np.full(len(FRONT), np.nan)), np.zeros(3))
+BLIND = flaser(Scan(np.full(len(FRONT), np.nan), FRONT, 0, 0.0), np.zeros(3))
 UNUSABLE = {
     "empty": (b"", "is empty"),
     "of another kind": (b"It was a dark and stormy night.\n", "holds no laser scan"),

@@ -1,4 +1,4 @@
-"""Fusion joins maps where shape and free space prove it, and says why where not (paper, VIII)."""
+"""Fusion joins maps where walls and free space prove it, and says why where not (paper, VIII)."""
 
 import re
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.fusion.align import FusionParameters, align_maps, align_robots
+from mapweave.fusion.align import FusionParameters, align, align_maps
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -236,7 +236,7 @@ def robot_map(robot: str, *components: LineMap) -> RobotMap:
 
 def test_every_component_of_one_robot_is_compared_with_every_one_of_the_other() -> None:
     stub = line_map(walls_of(rectangle(0, 0, 0.5, 0.5)))
-    found = align_robots(robot_map("a", LEFT, stub), robot_map("b", stub, RIGHT))
+    found = align(robot_map("a", LEFT, stub), robot_map("b", stub, RIGHT))
     assert {(one.reference, one.other): one.decision for one in found} == {
         ("a/0", "b/0"): "refused",
         ("a/0", "b/2"): "accepted",
@@ -246,7 +246,7 @@ def test_every_component_of_one_robot_is_compared_with_every_one_of_the_other() 
 
 
 def test_robots_without_a_map_have_nothing_to_compare() -> None:
-    assert align_robots(robot_map("a"), robot_map("b", LEFT)) == []
+    assert align(robot_map("a"), robot_map("b", LEFT)) == []
 
 
 @pytest.mark.parametrize(

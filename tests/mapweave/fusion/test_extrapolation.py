@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from mapweave.fusion.align import FusionParameters, align_maps, align_robots, prepare
+from mapweave.fusion.align import FusionParameters, align, align_maps, prepare
 from mapweave.fusion.extrapolation import ExtrapolationParameters, bend, holds, reach
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -96,7 +96,7 @@ def robot(name: str, lines: LineMap) -> RobotMap:
 
 def test_robots_are_judged_by_their_reach_as_maps_are(rng: Generator) -> None:
     one, other = shaken(part(HALL, 0, 50), rng), shaken(part(HALL, 20, 160), rng)
-    (found,) = align_robots(robot("a", one), robot("b", other))
+    (found,) = align(robot("a", one), robot("b", other))
     alone = align_maps(("a/0", one), ("b/0", other))
     assert (found.decision, found.reason) == (alone.decision, alone.reason)
     assert found.confidence == pytest.approx(alone.confidence)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapweave.evidence import Evidence
-from mapweave.fusion.align import FusionParameters, align_robots
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.fusion.parts import PartParameters, agreed, cut
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -59,7 +59,7 @@ def test_a_longer_path_has_longer_parts_and_not_more() -> None:
 def test_maps_bent_against_each_other_are_joined_in_parts() -> None:
     bent = np.radians(0.5)
     parameters = FusionParameters(parts=PartParameters(length=24.0))
-    (found,) = align_robots(robot("a", bent), robot("b", -bent), parameters)
+    (found,) = align(robot("a", bent), robot("b", -bent), parameters)
     assert found.decision == "accepted"
     assert found.cause.kind is ReasonKind.PARTS_AGREE
     numbers = found.evidence.by_name()
@@ -69,7 +69,7 @@ def test_maps_bent_against_each_other_are_joined_in_parts() -> None:
 
 
 def test_maps_that_are_rigid_are_joined_as_wholes() -> None:
-    (found,) = align_robots(robot("a", 0.0), robot("b", 0.0))
+    (found,) = align(robot("a", 0.0), robot("b", 0.0))
     assert found.decision == "accepted"
     assert found.evidence.parts is None
 

@@ -16,7 +16,7 @@ from hypothesis.extra.numpy import arrays
 from mapweave.errors import FileError
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry.arrays import FloatArray
-from mapweave.io.map_files import read_any, read_joint, read_map, write_joint, write_map
+from mapweave.io.map_files import load, read_joint, read_map, write_joint, write_map
 from mapweave.maps import (
     Alignment,
     JointComponent,
@@ -218,7 +218,7 @@ def refusal(read: Callable[[Path], object], path: Path) -> str:
 def test_a_robot_map_comes_back_as_it_was_written(robot_map: RobotMap, tmp_path: Path) -> None:
     write_map(tmp_path / "map.json", robot_map)
     assert_same(read_map(tmp_path / "map.json"), robot_map)
-    assert_same(read_any(tmp_path / "map.json"), robot_map)
+    assert_same(load(tmp_path / "map.json"), robot_map)
 
 
 @SETTINGS
@@ -227,7 +227,7 @@ def test_a_joint_map_comes_back_as_it_was_written(joint: JointMap, tmp_path: Pat
     write_joint(tmp_path / "joint.json", joint)
     found = read_joint(tmp_path / "joint.json")
     assert_same(found, joint)
-    assert_same(read_any(tmp_path / "joint.json"), joint)
+    assert_same(load(tmp_path / "joint.json"), joint)
     for one, other in zip(found.alignments, joint.alignments, strict=True):
         assert (one.cause, one.status, one.reason) == (other.cause, other.status, other.reason)
 
@@ -305,13 +305,13 @@ def test_what_is_not_finite_is_written_as_null(tmp_path: Path) -> None:
 def test_a_gzipped_file_is_read(content: dict[str, Any], tmp_path: Path) -> None:
     packed = tmp_path / "packed.json"
     packed.write_bytes(gzip.compress(json.dumps(content).encode()))
-    assert_same(read_any(packed), read_any(write(tmp_path, content)))
+    assert_same(load(packed), load(write(tmp_path, content)))
 
 
 @pytest.mark.parametrize("content", [MAP, JOINT], ids=["map", "joint"])
 def test_fields_of_a_later_version_are_ignored(content: dict[str, Any], tmp_path: Path) -> None:
-    expected = read_any(write(tmp_path, content))
-    assert_same(read_any(write(tmp_path, {**content, "colour": "red"})), expected)
+    expected = load(write(tmp_path, content))
+    assert_same(load(write(tmp_path, {**content, "colour": "red"})), expected)
 
 
 @pytest.mark.parametrize(
@@ -325,7 +325,7 @@ def test_fields_of_a_later_version_are_ignored(content: dict[str, Any], tmp_path
 )
 def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_path: Path) -> None:
     path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
-    message = refusal(read_any, write(tmp_path, without(content, steps)))
+    message = refusal(load, write(tmp_path, without(content, steps)))
     assert message.startswith(f"{path.removeprefix('.')}: Field required; expected a map file")
 
 
@@ -377,7 +377,7 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
 def test_a_wrong_value_is_named_with_what_was_expected(
     content: dict[str, Any], steps: Steps, value: object, place: str, expected: str, tmp_path: Path
 ) -> None:
-    message = refusal(read_any, write(tmp_path, changed(content, steps, value)))
+    message = refusal(load, write(tmp_path, changed(content, steps, value)))
     assert message.startswith(place)
     assert expected in message
 
@@ -399,7 +399,7 @@ def test_the_other_kind_of_map_is_refused(tmp_path: Path) -> None:
         (gzip.compress(json.dumps(MAP).encode())[:-30], "the gzip stream is cut off"),
     ],
 )
-@pytest.mark.parametrize("read", [read_map, read_joint, read_any])
+@pytest.mark.parametrize("read", [read_map, read_joint, load])
 def test_what_is_no_map_file_is_refused(
     read: Callable[[Path], object], content: bytes, problem: str, tmp_path: Path
 ) -> None:
@@ -410,7 +410,7 @@ def test_what_is_no_map_file_is_refused(
     assert message.endswith("expected a map file (mapweave/map/1 or mapweave/joint/1)")
 
 
-@pytest.mark.parametrize("read", [read_map, read_joint, read_any])
+@pytest.mark.parametrize("read", [read_map, read_joint, load])
 def test_a_missing_file_and_a_folder_are_refused(
     read: Callable[[Path], object], tmp_path: Path
 ) -> None:

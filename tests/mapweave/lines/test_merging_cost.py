@@ -10,9 +10,9 @@ from mapweave.lines.merging_cost import (
     Pairs,
     collinearity,
     line_height,
-    merge,
+    merge_cost,
+    merged_segment,
     merged_segments,
-    merging_cost,
     parallelism,
     proximity,
 )
@@ -71,7 +71,7 @@ def plain_cost(first: FloatArray, second: FloatArray, direction: float | None) -
 def test_the_cost_is_that_of_the_construction_in_the_paper(direction: float | None) -> None:
     first, second = some_segments(1)
     expected = [plain_cost(a, b, direction) for a, b in zip(first, second, strict=True)]
-    np.testing.assert_allclose(merging_cost(first, second, direction), expected, rtol=1e-9)
+    np.testing.assert_allclose(merge_cost(first, second, direction), expected, rtol=1e-9)
 
 
 def test_parallelism_is_length_times_tangent() -> None:
@@ -91,7 +91,7 @@ def test_parallelism_is_infinite_when_the_direction_is_orthogonal_to_a_segment(
 ) -> None:
     pairs = pair_of([0, 0, 2, 0], second)
     assert np.isposinf(parallelism(pairs, unit(90))[0])
-    assert np.isposinf(merging_cost(np.array([[0, 0, 2, 0]]), np.array([second]), np.pi / 2)[0])
+    assert np.isposinf(merge_cost(np.array([[0, 0, 2, 0]]), np.array([second]), np.pi / 2)[0])
 
 
 def test_parallelism_is_zero_iff_both_segments_and_the_direction_are_parallel() -> None:
@@ -118,7 +118,7 @@ def test_proximity_is_zero_iff_an_end_of_one_lies_on_the_other() -> None:
 
 
 def test_collinear_touching_segments_cost_nothing() -> None:
-    cost = merging_cost(np.array([[0.0, 0, 1, 2]]), np.array([[1.0, 2, 3, 6]]))
+    cost = merge_cost(np.array([[0.0, 0, 1, 2]]), np.array([[1.0, 2, 3, 6]]))
     assert cost[0] == pytest.approx(0, abs=1e-12)
 
 
@@ -128,14 +128,14 @@ def test_the_parts_are_weighed_2_to_a_quarter_to_a_half() -> None:
 
 def test_how_a_segment_is_directed_does_not_matter() -> None:
     first, second = some_segments(2)
-    expected = merging_cost(first, second)
-    np.testing.assert_allclose(merging_cost(first[:, [2, 3, 0, 1]], second), expected)
-    np.testing.assert_allclose(merging_cost(first, second[:, [2, 3, 0, 1]]), expected)
+    expected = merge_cost(first, second)
+    np.testing.assert_allclose(merge_cost(first[:, [2, 3, 0, 1]], second), expected)
+    np.testing.assert_allclose(merge_cost(first, second[:, [2, 3, 0, 1]]), expected)
 
 
 def test_the_cost_is_symmetric() -> None:
     first, second = some_segments(3)
-    np.testing.assert_allclose(merging_cost(first, second), merging_cost(second, first))
+    np.testing.assert_allclose(merge_cost(first, second), merge_cost(second, first))
 
 
 def test_a_rigid_motion_changes_no_cost_and_moves_the_merged_segment_along() -> None:
@@ -143,17 +143,19 @@ def test_a_rigid_motion_changes_no_cost_and_moves_the_merged_segment_along() -> 
     for motion in np.random.default_rng(4).uniform(-3, 3, (5, 3)):
         moved = se2.transform_segments(motion, first), se2.transform_segments(motion, second)
         np.testing.assert_allclose(
-            merging_cost(*moved, 0.3 + motion[2]), merging_cost(first, second, 0.3), rtol=1e-6
+            merge_cost(*moved, 0.3 + motion[2]), merge_cost(first, second, 0.3), rtol=1e-6
         )
         np.testing.assert_allclose(
-            merge(*moved), se2.transform_segments(motion, merge(first, second)), atol=1e-9
+            merged_segment(*moved),
+            se2.transform_segments(motion, merged_segment(first, second)),
+            atol=1e-9,
         )
 
 
 def test_one_segment_pairs_with_many() -> None:
     first, second = some_segments(5)
     repeated = np.repeat(first[:1], len(second), axis=0)
-    np.testing.assert_array_equal(merging_cost(first[:1], second), merging_cost(repeated, second))
+    np.testing.assert_array_equal(merge_cost(first[:1], second), merge_cost(repeated, second))
 
 
 def test_the_line_is_placed_so_that_distance_times_length_is_equal_on_both_sides() -> None:
@@ -166,13 +168,13 @@ def test_the_line_is_placed_so_that_distance_times_length_is_equal_on_both_sides
 
 
 def test_the_merged_segment_is_the_hull_of_the_projections() -> None:
-    merged = merge(np.array([[0.0, 0, 3, 0]]), np.array([[2.0, 0.4, 3.0, 0.4]]))
+    merged = merged_segment(np.array([[0.0, 0, 3, 0]]), np.array([[2.0, 0.4, 3.0, 0.4]]))
     np.testing.assert_allclose(merged, [[0, 0.1, 3, 0.1]])
 
 
 def test_the_merged_segment_follows_the_direction_and_covers_both() -> None:
     first, second = some_segments(7)
-    merged = merge(first, second, 0.7)
+    merged = merged_segment(first, second, 0.7)
     ahead = np.array([np.cos(0.7), np.sin(0.7)])
     across = np.array([-ahead[1], ahead[0]])
     ends = np.stack([merged[:, :2], merged[:, 2:]])
@@ -185,23 +187,23 @@ def test_the_merged_segment_follows_the_direction_and_covers_both() -> None:
 def test_the_merged_segment_is_directed_as_the_first() -> None:
     first, second = some_segments(8)
     for direction in (None, 0.7, 0.7 + np.pi):
-        merged = merge(first, second, direction)
+        merged = merged_segment(first, second, direction)
         product = ((merged[:, 2:] - merged[:, :2]) * (first[:, 2:] - first[:, :2])).sum(axis=1)
         assert (product >= 0).all()
 
 
 def test_a_segment_of_weight_moves_the_less_for_it() -> None:
     wall, sighting = np.array([[0.0, 0, 4, 0]]), np.array([[0.0, 0.1, 4, 0.1]])
-    assert merge(wall, sighting)[0, 1] == pytest.approx(0.05)
-    moved = merge(wall, sighting, first_weight=396.0, second_weight=4.0)
+    assert merged_segment(wall, sighting)[0, 1] == pytest.approx(0.05)
+    moved = merged_segment(wall, sighting, first_weight=396.0, second_weight=4.0)
     assert moved[0, 1] == pytest.approx(0.001)
 
 
 def test_weights_in_place_of_lengths_are_lengths_by_default() -> None:
     first, second = some_segments(9)
     lengths = [np.hypot(*(s[:, 2:] - s[:, :2]).T) for s in (first, second)]
-    weighed = merging_cost(first, second, first_weight=lengths[0], second_weight=lengths[1])
-    np.testing.assert_allclose(weighed, merging_cost(first, second))
+    weighed = merge_cost(first, second, first_weight=lengths[0], second_weight=lengths[1])
+    np.testing.assert_allclose(weighed, merge_cost(first, second))
 
 
 def test_ends_within_the_noise_are_averaged_and_others_are_not() -> None:
@@ -212,5 +214,5 @@ def test_ends_within_the_noise_are_averaged_and_others_are_not() -> None:
 
 
 def test_a_segment_of_no_length_is_merged_with_nothing() -> None:
-    cost = merging_cost(np.array([[1.0, 1, 1, 1]]), np.array([[0.0, 1, 2, 1], [1, 1, 1, 1]]))
+    cost = merge_cost(np.array([[1.0, 1, 1, 1]]), np.array([[0.0, 1, 2, 1], [1, 1, 1, 1]]))
     assert np.isposinf(cost).all()

@@ -1,4 +1,4 @@
-"""A robot's components become one where their shapes prove it, and only there (paper, II)."""
+"""A robot's components become one where what both saw proves it, and only there (paper, II)."""
 
 from dataclasses import replace
 

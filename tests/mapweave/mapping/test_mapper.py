@@ -60,7 +60,7 @@ def kidnapped() -> Run:
     )
     back, third = scans_along(BUILDING, [(16, 1.1), (13, 1.1), (2.5, 0.9)], 3)
     scans = [*out, *away, *back]
-    numbered = [Scan(k, s.stamp, s.angles, s.ranges) for k, s in enumerate(scans)]
+    numbered = [Scan(s.ranges, s.angles, k, s.stamp) for k, s in enumerate(scans)]
     return run(numbered, np.vstack([first, second, third]))
 
 
@@ -167,19 +167,20 @@ def test_a_blind_scan_is_not_placed_and_loses_nothing() -> None:
     """A robot that looked into the void for a while goes on where it was."""
     scans, _ = scans_along(BUILDING, [(2, 1), (6, 1)], 4)
     void = np.full(len(FRONT), np.nan)
-    blind = [Scan(100 + k, 0.0, FRONT, void) for k in range(8)]
+    blind = [Scan(void, FRONT, 6 + k) for k in range(8)]
+    after = [Scan(s.ranges, s.angles, s.index + 8, s.stamp) for s in scans[6:]]
     mapper = Mapper("a")
-    said = [mapper.add(scan) for scan in [*scans[:6], *blind, *scans[6:]]]
+    said = [mapper.add(scan) for scan in [*scans[:6], *blind, *after]]
     assert [p.placed for p in said[6:14]] == [False] * 8
     where = placed(mapper.finish())
-    assert sorted(where) == list(range(len(scans)))
+    assert sorted(where) == [*range(6), *(scan.index for scan in after)]
     assert {component for component, _ in where.values()} == {0}
 
 
 def test_blind_scans_alone_make_no_map() -> None:
     mapper = Mapper("a")
     for k in range(20):
-        assert not mapper.add(Scan(k, 0.0, FRONT, np.full(len(FRONT), np.nan))).placed
+        assert not mapper.add(Scan(np.full(len(FRONT), np.nan), FRONT, k, 0.0)).placed
     assert mapper.finish().submaps == ()
 
 
@@ -200,7 +201,7 @@ def test_odometry_that_is_wrong_does_not_decide_where_the_robot_is(rng: Generato
     without, misled = Mapper("a"), Mapper("a")
     for scan, guess in zip(scans, lying, strict=True):
         without.add(scan)
-        misled.add(Scan(scan.index, scan.stamp, scan.angles, scan.ranges, guess))
+        misled.add(Scan(scan.ranges, scan.angles, scan.index, scan.stamp, guess))
     ours, theirs = placed(without.finish()), placed(misled.finish())
     assert ours.keys() == theirs.keys()
     for index, (component, pose) in ours.items():
@@ -246,7 +247,7 @@ def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> No
     for visit, (outline, start, end) in enumerate(places):
         scans, _ = scans_along(outline, [start, end], visit)
         said = [
-            mapper.add(Scan(100 * visit + k, s.stamp, s.angles, s.ranges))
+            mapper.add(Scan(s.ranges, s.angles, 100 * visit + k, s.stamp))
             for k, s in enumerate(scans)
         ]
         numbers += [p.component for p in said if p.lost]
@@ -295,7 +296,7 @@ def test_a_submap_that_is_cut_and_a_robot_that_is_lost_meanwhile_share_no_number
     away, _ = scans_along(OTHER_BUILDING, [(5, 1.5), (9, 1.5), (9, -3)], 2)
     cut_at = 60  # the second submap is finished and not yet adopted
     for k, scan in enumerate([*out[:cut_at], *away]):
-        mapper.add(Scan(k, scan.stamp, scan.angles, scan.ranges))
+        mapper.add(Scan(scan.ranges, scan.angles, k, scan.stamp))
     robot_map = mapper.finish()
     assert [s.id for s in robot_map.submaps] == list(range(len(robot_map.submaps)))
     assert len(robot_map.components) == 3

@@ -1,4 +1,4 @@
-"""Hypotheses: the true transform is among those that shapes propose (paper, H1 and H2)."""
+"""Hypotheses: the true transform is among those that two maps propose (paper, H1 and H2)."""
 
 import numpy as np
 import pytest

@@ -61,7 +61,7 @@ def test_beams_that_did_not_come_back_leave_a_gap() -> None:
     ranges = scan.ranges.copy()
     ranges[85:95] = np.nan
     whole = scan_free_space(scan, np.zeros(3), P)
-    free = scan_free_space(Scan(0, 0.0, scan.angles, ranges), np.zeros(3), P)
+    free = scan_free_space(Scan(ranges, scan.angles, 0, 0.0), np.zeros(3), P)
     wedge = np.radians([-4.9, 3.9])
     for bearing in wedge:
         assert whole.contains(shapely.Point(3 * np.cos(bearing), 3 * np.sin(bearing)))
@@ -71,7 +71,7 @@ def test_beams_that_did_not_come_back_leave_a_gap() -> None:
 
 
 def test_a_blind_scan_frees_nothing() -> None:
-    blind = Scan(0, 0.0, FRONT, np.full(len(FRONT), np.nan))
+    blind = Scan(np.full(len(FRONT), np.nan), FRONT, 0, 0.0)
     assert scan_free_space(blind, np.zeros(3), P).is_empty
 
 

@@ -77,7 +77,7 @@ def test_beams_that_did_not_come_back_part_a_wall() -> None:
     scan = cast(ROOM, [1, 2, 0])
     ranges = scan.ranges.copy()
     ranges[80:101] = np.nan
-    found = extract_segments(Scan(0, 0.0, scan.angles, ranges))
+    found = extract_segments(Scan(ranges, scan.angles, 0, 0.0))
     across = np.sort(np.arctan2(found.segments[:, 1::2], found.segments[:, ::2]))
     assert not ((across[:, 0] < 0) & (across[:, 1] > 0)).any()
     assert (found.label[80:101] == -1).all()
@@ -85,7 +85,7 @@ def test_beams_that_did_not_come_back_part_a_wall() -> None:
 
 @pytest.mark.parametrize("ranges", [np.full(181, np.nan), np.where(np.arange(181) == 5, 1, np.nan)])
 def test_a_scan_that_shows_nothing_has_no_segments(ranges: FloatArray) -> None:
-    found = extract_segments(Scan(0, 0.0, FRONT, ranges))
+    found = extract_segments(Scan(ranges, FRONT, 0, 0.0))
     assert found.segments.shape == (0, 4)
     assert (found.label == -1).all()
 
@@ -116,8 +116,9 @@ def test_a_wall_is_one_segment_however_its_returns_err(seed: int) -> None:
     wall = np.array([[3.0, -2.5, 3.0, 2.5]])
     scan = cast(wall, [0, 0, 0], noise=rng)
     hits = np.flatnonzero(scan.hits)
-    scan.ranges[hits[[0, -1]]] += rng.choice([-0.04, 0.04], 2)
-    (found,) = extract_segments(scan).segments
+    ranges = scan.ranges.copy()
+    ranges[hits[[0, -1]]] += rng.choice([-0.04, 0.04], 2)
+    (found,) = extract_segments(Scan(ranges, scan.angles)).segments
     run = found[2:] - found[:2]
     assert np.hypot(*run) == pytest.approx(5, abs=0.25)
     assert abs(np.degrees(np.arctan2(run[0], run[1]))) < 0.5

@@ -29,7 +29,7 @@ def test_points_well_before_a_wall_are_seen_through_and_others_are_not(
 def test_a_beam_that_did_not_come_back_proves_nothing_nor_do_its_neighbours() -> None:
     ranges = SCAN.ranges.copy()
     ranges[90] = np.nan  # straight ahead
-    scan = Scan(0, 0.0, SCAN.angles, ranges)
+    scan = Scan(ranges, SCAN.angles, 0, 0.0)
     points = np.column_stack([np.cos(FRONT), np.sin(FRONT)])  # all 1 m away
     through = seen_through(scan, points, 0.3, 20.0)
     assert np.flatnonzero(~through).tolist() == [89, 90, 91]
@@ -46,7 +46,7 @@ def test_a_margin_may_be_given_for_each_point() -> None:
 
 
 def test_space_is_clear_as_far_as_a_beam_and_both_its_neighbours_reach() -> None:
-    scan = Scan(0, 0.0, np.linspace(-1, 1, 5), np.array([3.0, 1.0, 4.0, 5.0, 6.0]))
+    scan = Scan(np.array([3.0, 1.0, 4.0, 5.0, 6.0]), np.linspace(-1, 1, 5), 0, 0.0)
     np.testing.assert_array_equal(clear_ranges(scan, 5.5), [1.0, 1.0, 1.0, 4.0, 5.0])
 
 
@@ -57,7 +57,7 @@ def test_it_does_not_matter_where_the_turn_of_a_lidar_begins(
 ) -> None:
     """Beams all round, at 5 m: every point nearer is seen through, across the seam as well."""
     angles = first + np.radians(1.0) * np.arange(beams)
-    scan = Scan(0, 0.0, angles, np.full(beams, 5.0))
+    scan = Scan(np.full(beams, 5.0), angles, 0, 0.0)
     bearing, distance = rng.uniform(-np.pi, np.pi, 200), rng.uniform(0.5, 4.9, 200)
     points = distance[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
     assert seen_through(scan, points, 0.0, 20.0).all()

@@ -88,7 +88,7 @@ def test_a_scan_of_another_place_is_not_placed(rng: Generator) -> None:
 @pytest.mark.parametrize("seen", [0, 15])
 def test_a_scan_that_shows_too_little_is_blind_and_not_placed(seen: int) -> None:
     ranges = np.where(np.arange(len(FRONT)) < seen, 2.0, np.nan)
-    blind = Scan(0, 0.0, FRONT, ranges)
+    blind = Scan(ranges, FRONT, 0, 0.0)
     tracker = Tracker()
     assert tracker.is_blind(observed(blind))
     assert placed(tracker, blind) is None
@@ -140,7 +140,7 @@ def passer_by(pose: list[float], rng: Generator) -> Scan:
     """Return a scan in which somebody stands close before the robot and hides most of it."""
     scan = cast(WALLS, pose, noise=rng)
     near = np.where(np.abs(FRONT) < np.radians(60), 0.6, scan.ranges)
-    return Scan(0, 0.0, FRONT, near)
+    return Scan(near, FRONT, 0, 0.0)
 
 
 def test_a_scan_that_people_hide_costs_neither_it_nor_the_way_on(rng: Generator) -> None:
