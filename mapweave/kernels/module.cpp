@@ -1,0 +1,11 @@
+// The compiled kernels, one file each; every one has its NumPy twin in the module of its name.
+#include <nanobind/nanobind.h>
+
+#include "point_map.hpp"
+
+namespace nb = nanobind;
+
+NB_MODULE(_compiled, m) {
+  m.doc() = "Compiled inner loops; see the modules beside for what they compute.";
+  bind_point_map(m);
+}
