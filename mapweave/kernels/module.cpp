@@ -1,11 +1,15 @@
 // The compiled kernels, one file each; every one has its NumPy twin in the module of its name.
 #include <nanobind/nanobind.h>
 
+#include "correlative.hpp"
 #include "point_map.hpp"
+#include "viewpoints.hpp"
 
 namespace nb = nanobind;
 
 NB_MODULE(_compiled, m) {
   m.doc() = "Compiled inner loops; see the modules beside for what they compute.";
+  bind_correlative(m);
   bind_point_map(m);
+  bind_viewpoints(m);
 }

@@ -1,0 +1,84 @@
+// Correlative search: the score of every pose in a window. The twin and the words are in correlative.py.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "arrays.hpp"
+
+namespace correlative {
+
+// (size + 1, size + 1) nearness in [0, 1]; the last row and column stand for everything outside: 0.
+inline Out<float> nearness_field(In<double, 2> points, In<double, 1> origin, double cell, int64_t size,
+                                 double sigma) {
+  if (points.shape(1) != 2 || origin.shape(0) != 2 || size < 1 || !(cell > 0 && sigma > 0))
+    throw std::invalid_argument("points (n, 2), origin (2,), size >= 1, cell and sigma > 0 expected");
+  const int64_t side = size + 1;
+  const int64_t reach = static_cast<int64_t>(std::floor(4 * sigma / cell));
+  std::vector<float> kernel(static_cast<size_t>((reach + 1) * (reach + 1)));
+  for (int64_t a = 0; a <= reach; ++a)
+    for (int64_t b = 0; b <= reach; ++b) {
+      const double squared = static_cast<double>(a * a + b * b) * cell * cell;
+      kernel[a * (reach + 1) + b] = squared <= 16 * sigma * sigma ? static_cast<float>(std::exp(-squared / (2 * sigma * sigma))) : 0.0f;
+    }
+  std::vector<char> taken(static_cast<size_t>(side * side), 0);
+  std::vector<float> value(static_cast<size_t>(side * side), 0.0f);
+  for (size_t k = 0; k < points.shape(0); ++k) {
+    const double* p = points.data() + 2 * k;
+    const double column = std::floor((p[0] - origin.data()[0]) / cell), row = std::floor((p[1] - origin.data()[1]) / cell);
+    if (!(column >= 0 && column < size && row >= 0 && row < size)) continue;
+    const int64_t i = static_cast<int64_t>(column), j = static_cast<int64_t>(row);
+    char& here = taken[i * side + j];
+    if (here) continue;
+    here = 1;
+    for (int64_t a = std::max<int64_t>(0, i - reach); a <= std::min(size - 1, i + reach); ++a)
+      for (int64_t b = std::max<int64_t>(0, j - reach); b <= std::min(size - 1, j + reach); ++b) {
+        float& there = value[a * side + b];
+        there = std::max(there, kernel[std::abs(a - i) * (reach + 1) + std::abs(b - j)]);
+      }
+  }
+  return give(std::move(value), {static_cast<size_t>(side), static_cast<size_t>(side)});
+}
+
+// (t, s, s) summed nearness of the points, turned by each of t turns and moved by each pair of s shifts.
+inline Out<float> window_scores(In<double, 2> points, In<float, 2> field, In<double, 1> origin, double cell,
+                                In<double, 1> turns, In<double, 2> shifts) {
+  const int64_t n = static_cast<int64_t>(points.shape(0)), outside = static_cast<int64_t>(field.shape(0)) - 1;
+  const int64_t s = static_cast<int64_t>(shifts.shape(0)), t = static_cast<int64_t>(turns.shape(0));
+  if (points.shape(1) != 2 || shifts.shape(1) != 2 || field.shape(0) != field.shape(1) || outside < 0 || origin.shape(0) != 2)
+    throw std::invalid_argument("points (n, 2), field (m, m), origin (2,), shifts (s, 2) expected");
+  std::vector<int64_t> base(static_cast<size_t>(2 * s));
+  for (int64_t k = 0; k < s; ++k)
+    for (int64_t a = 0; a < 2; ++a)
+      base[2 * k + a] = static_cast<int64_t>(std::nearbyint((shifts.data()[2 * k + a] - origin.data()[a]) / cell));
+  std::vector<float> scores(static_cast<size_t>(t * s * s), 0.0f);
+  std::vector<int64_t> rows(static_cast<size_t>(s));
+  for (int64_t k = 0; k < t; ++k) {
+    const double c = std::cos(turns.data()[k]), sn = std::sin(turns.data()[k]);
+    float* out = scores.data() + k * s * s;
+    for (int64_t i = 0; i < n; ++i) {
+      const double* p = points.data() + 2 * i;
+      const int64_t column = static_cast<int64_t>(std::floor((c * p[0] - sn * p[1]) / cell));
+      const int64_t row = static_cast<int64_t>(std::floor((sn * p[0] + c * p[1]) / cell));
+      for (int64_t b = 0; b < s; ++b) {
+        const int64_t j = row + base[2 * b + 1];
+        rows[b] = j < 0 || j > outside ? outside : j;
+      }
+      for (int64_t a = 0; a < s; ++a) {
+        const int64_t at = column + base[2 * a];
+        const float* line = field.data() + (at < 0 || at > outside ? outside : at) * (outside + 1);
+        for (int64_t b = 0; b < s; ++b) out[a * s + b] += line[rows[b]];
+      }
+    }
+  }
+  return give(std::move(scores), {static_cast<size_t>(t), static_cast<size_t>(s), static_cast<size_t>(s)});
+}
+
+}  // namespace correlative
+
+inline void bind_correlative(nb::module_& m) {
+  m.def("nearness_field", &correlative::nearness_field, nb::arg("points"), nb::arg("origin"), nb::arg("cell"),
+        nb::arg("size"), nb::arg("sigma"));
+  m.def("window_scores", &correlative::window_scores, nb::arg("points"), nb::arg("field"), nb::arg("origin"),
+        nb::arg("cell"), nb::arg("turns"), nb::arg("shifts"));
+}

@@ -1,0 +1,420 @@
+// Oriented points in a grid: nearest neighbours in place and normal, and ICP on them.
+// The twin and the words are in point_map.py.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "arrays.hpp"
+
+namespace point_map {
+
+constexpr double kTurn = 6.283185307179586476925286766559;
+constexpr double kHalfTurn = kTurn / 2;
+
+inline double wrap(double angle) { return angle - kTurn * std::ceil((angle - kHalfTurn) / kTurn); }
+
+struct Point {
+  double x, y, u, v;  // place [m], normal times its weight [m]
+  double nx, ny;      // unit normal
+  int64_t number;     // in the order of adding
+  int64_t seen;       // block in which it was seen last
+  int32_t tag;        // polyline, -1 for none
+};
+
+struct Settings {
+  double start_scale, end_scale, shrink, converged, noise;
+  int max_iterations;
+};
+
+struct Fit {
+  double x, y, turn;
+  std::array<double, 9> information;
+};
+
+// Solves the symmetric positive definite 3 x 3 system by Cholesky's factors.
+inline std::array<double, 3> solve(const std::array<double, 9>& a, const std::array<double, 3>& b) {
+  const double l00 = std::sqrt(a[0]), l10 = a[3] / l00, l20 = a[6] / l00;
+  const double l11 = std::sqrt(a[4] - l10 * l10), l21 = (a[7] - l20 * l10) / l11;
+  const double l22 = std::sqrt(a[8] - l20 * l20 - l21 * l21);
+  const double y0 = b[0] / l00, y1 = (b[1] - l10 * y0) / l11;
+  const double z2 = (b[2] - l20 * y0 - l21 * y1) / l22 / l22;
+  const double z1 = (y1 - l21 * z2) / l11, z0 = (y0 - l10 * z1 - l20 * z2) / l00;
+  return {z0, z1, z2};
+}
+
+class PointMap {
+ public:
+  PointMap(double normal_weight, double cell, double thin, int64_t blocks)
+      : weight_(normal_weight), cell_(cell), thin_(thin), blocks_(blocks) {
+    if (!(normal_weight > 0 && cell > 0 && thin >= 0 && blocks >= 1))
+      throw std::invalid_argument("normal_weight, cell > 0, thin >= 0, blocks >= 1 expected");
+  }
+
+  int64_t size() const { return count_; }
+
+  // Adds a block; a point like one that is there only renews it. Forgets what was not seen lately.
+  void add(In<double, 2> points, In<double, 2> normals, std::optional<In<int64_t, 1>> tags) {
+    const size_t n = check(points, normals);
+    if (tags && tags->shape(0) != n) throw std::invalid_argument("tags: one a point expected");
+    std::vector<Point> fresh;
+    fresh.reserve(n);
+    for (size_t i = 0; i < n; ++i) {
+      const double* p = points.data() + 2 * i;
+      const double* m = normals.data() + 2 * i;
+      if (!(std::isfinite(p[0]) && std::isfinite(p[1]))) throw std::invalid_argument("points: finite numbers expected");
+      Point point{p[0], p[1], weight_ * m[0], weight_ * m[1], m[0], m[1], 0, block_, -1};
+      if (tags) point.tag = static_cast<int32_t>(tags->data()[i]);
+      Point* like = thin_ > 0 ? const_cast<Point*>(nearest(point.x, point.y, point.u, point.v, thin_)) : nullptr;
+      if (like)
+        like->seen = block_;
+      else
+        fresh.push_back(point);
+    }
+    for (Point& point : fresh) {  // afterwards: a block's own points do not thin each other
+      point.number = next_++;
+      reach_out(point.x, point.y);
+      cells_[cell_of(point.x, point.y)].push_back(point);
+      ++count_;
+    }
+    ++block_;
+    forget();
+  }
+
+  // (n,) distance to the nearest point, place and normal at once, and its number.
+  nb::tuple find(In<double, 2> points, In<double, 2> normals, double reach) const {
+    const size_t n = check(points, normals);
+    std::vector<double> distance(n, std::numeric_limits<double>::infinity());
+    std::vector<int64_t> number(n, -1);
+    for (size_t i = 0; i < n; ++i) {
+      const double* p = points.data() + 2 * i;
+      const double* m = normals.data() + 2 * i;
+      const Point* found = nearest(p[0], p[1], weight_ * m[0], weight_ * m[1], reach);
+      if (!found) continue;
+      distance[i] = std::sqrt(squared(*found, p[0], p[1], weight_ * m[0], weight_ * m[1]));
+      number[i] = found->number;
+    }
+    return nb::make_tuple(give(std::move(distance), {n}), give(std::move(number), {n}));
+  }
+
+  // (k, n) which points have a partner within reach, at each pose.
+  Out<bool> explains(In<double, 2> points, In<double, 2> normals, In<double, 2> poses, double reach) const {
+    const size_t n = check(points, normals), k = check_poses(poses);
+    auto* held = new std::unique_ptr<bool[]>(new bool[n * k]());
+    nb::capsule owner(held, [](void* p) noexcept { delete static_cast<std::unique_ptr<bool[]>*>(p); });
+    bool* out = held->get();
+    for (size_t j = 0; j < k; ++j) {
+      const double* pose = poses.data() + 3 * j;
+      const double c = std::cos(pose[2]), s = std::sin(pose[2]);
+      for (size_t i = 0; i < n; ++i) {
+        const double* p = points.data() + 2 * i;
+        const double* m = normals.data() + 2 * i;
+        const double x = pose[0] + c * p[0] - s * p[1], y = pose[1] + s * p[0] + c * p[1];
+        const double u = weight_ * (c * m[0] - s * m[1]), v = weight_ * (s * m[0] + c * m[1]);
+        out[j * n + i] = any_within(x, y, u, v, reach);
+      }
+    }
+    return Out<bool>(out, {k, n}, owner);
+  }
+
+  // Poses (k, 3) where the points come to lie from each start, and what holds them (k, 3, 3).
+  nb::tuple align(In<double, 2> points, In<double, 2> normals, In<double, 2> starts, In<double, 2> prior,
+                  const Settings& p, std::optional<In<int64_t, 1>> tags,
+                  std::optional<In<bool, 2>> corresponding) const {
+    const size_t n = check(points, normals), k = check_poses(starts);
+    if (prior.shape(0) != 3 || prior.shape(1) != 3) throw std::invalid_argument("prior: (3, 3) expected");
+    if (bool(tags) != bool(corresponding) || (tags && tags->shape(0) != n))
+      throw std::invalid_argument("tags, one a point, and corresponding come together");
+    std::vector<double> poses(3 * k), information(9 * k);
+    for (size_t j = 0; j < k; ++j) {
+      const Fit fit = align_one(points.data(), normals.data(), n, starts.data() + 3 * j, prior.data(), p,
+                                tags ? tags->data() : nullptr, corresponding ? &*corresponding : nullptr);
+      poses[3 * j] = fit.x, poses[3 * j + 1] = fit.y, poses[3 * j + 2] = wrap(fit.turn);
+      std::copy(fit.information.begin(), fit.information.end(), information.begin() + 9 * j);
+    }
+    return nb::make_tuple(give(std::move(poses), {k, 3}), give(std::move(information), {k, 3, 3}));
+  }
+
+  // (n, 2) points and (n, 2) normals that are there, in the order of adding.
+  nb::tuple content() const {
+    std::vector<const Point*> all = in_order();
+    std::vector<double> points, normals;
+    for (const Point* p : all) {
+      points.insert(points.end(), {p->x, p->y});
+      normals.insert(normals.end(), {p->nx, p->ny});
+    }
+    const size_t n = all.size();
+    return nb::make_tuple(give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}));
+  }
+
+  // (k,) of the points in sight from each pose, the share that lie before what the beams hit.
+  Out<double> seen_through(In<double, 1> clear, double first, double spacing, In<double, 2> poses,
+                           double clearance, double sight, double far_sight, double facing) const {
+    const size_t k = check_poses(poses);
+    const int64_t beams = static_cast<int64_t>(clear.shape(0));
+    const bool closed = beams * spacing > kTurn - spacing / 2;
+    std::vector<double> shares(k, 0.0);
+    for (size_t j = 0; j < k; ++j) {
+      const double* pose = poses.data() + 3 * j;
+      const double c = std::cos(pose[2]), s = std::sin(pose[2]);
+      int64_t in_sight = 0, through = 0;
+      for_each_near(pose[0], pose[1], std::max(sight, far_sight), [&](const Point& q) {
+        const double dx = q.x - pose[0], dy = q.y - pose[1];
+        const double squared = dx * dx + dy * dy;
+        if (squared >= sight * sight) {
+          if (squared >= far_sight * far_sight) return;
+          const double ahead = -(dx * q.nx + dy * q.ny);
+          if (!(ahead > 0 && ahead * ahead > facing * facing * squared)) return;
+        }
+        ++in_sight;
+        double steps = std::fmod(std::atan2(c * dy - s * dx, c * dx + s * dy) - first, kTurn);
+        if (steps < 0) steps += kTurn;
+        steps /= spacing;
+        if (!(steps <= beams - 1 || closed)) return;
+        int64_t beam = std::llrint(steps);
+        if (beam >= beams) beam = 0;
+        const double before = clear.data()[beam] - clearance;
+        if (before > 0 && squared < before * before) ++through;
+      });
+      if (in_sight) shares[j] = static_cast<double>(through) / static_cast<double>(in_sight);
+    }
+    return give(std::move(shares), {k});
+  }
+
+  PointMap copy() const { return *this; }
+
+ private:
+  double weight_, cell_, thin_;
+  int64_t blocks_, block_ = 0, next_ = 0, count_ = 0;
+  int64_t left_ = 0, low_ = 0, columns_ = 0, rows_ = 0;  // the cells there are
+  std::vector<std::vector<Point>> cells_;
+
+  static size_t check(In<double, 2> points, In<double, 2> normals) {
+    if (points.shape(1) != 2 || normals.shape(1) != 2 || points.shape(0) != normals.shape(0))
+      throw std::invalid_argument("points and normals: (n, 2) each expected");
+    return points.shape(0);
+  }
+
+  static size_t check_poses(In<double, 2> poses) {
+    if (poses.shape(1) != 3) throw std::invalid_argument("poses: (k, 3) expected");
+    return poses.shape(0);
+  }
+
+  static double squared(const Point& q, double x, double y, double u, double v) {
+    const double dx = q.x - x, dy = q.y - y, du = q.u - u, dv = q.v - v;
+    return dx * dx + dy * dy + (du * du + dv * dv);
+  }
+
+  int64_t index(double value) const { return static_cast<int64_t>(std::floor(value / cell_)); }
+  size_t cell_of(double x, double y) const {
+    return static_cast<size_t>((index(x) - left_) * rows_ + (index(y) - low_));
+  }
+
+  // Makes room for a place outside: the grid grows by half its size at least.
+  void reach_out(double x, double y) {
+    const int64_t i = index(x), j = index(y);
+    if (i >= left_ && i < left_ + columns_ && j >= low_ && j < low_ + rows_) return;
+    const int64_t margin = 16;
+    int64_t left = i - margin, right = i + margin, low = j - margin, high = j + margin;
+    if (columns_ > 0) {
+      left = std::min(left_, i < left_ ? i - margin - columns_ / 2 : left_);
+      right = std::max(left_ + columns_, i >= left_ + columns_ ? i + margin + columns_ / 2 : left_ + columns_);
+      low = std::min(low_, j < low_ ? j - margin - rows_ / 2 : low_);
+      high = std::max(low_ + rows_, j >= low_ + rows_ ? j + margin + rows_ / 2 : low_ + rows_);
+    }
+    lay_out(left, low, right - left + 1, high - low + 1);
+  }
+
+  void lay_out(int64_t left, int64_t low, int64_t columns, int64_t rows) {
+    if (columns > kMaxCells / rows) throw std::invalid_argument("points: spread over too wide an area");
+    std::vector<std::vector<Point>> cells(static_cast<size_t>(columns * rows));
+    for (int64_t i = 0; i < columns_; ++i)
+      for (int64_t j = 0; j < rows_; ++j) {
+        const int64_t a = i + left_ - left, b = j + low_ - low;
+        if (a >= 0 && a < columns && b >= 0 && b < rows)
+          cells[a * rows + b] = std::move(cells_[i * rows_ + j]);
+      }
+    cells_ = std::move(cells);
+    left_ = left, low_ = low, columns_ = columns, rows_ = rows;
+  }
+
+  // Forgets points that the last blocks did not see; gives back cells where nothing is left.
+  void forget() {
+    const int64_t oldest = block_ - blocks_;
+    if (oldest <= 0) return;
+    int64_t first = columns_, last = -1, lowest = rows_, highest = -1;
+    for (int64_t i = 0; i < columns_; ++i)
+      for (int64_t j = 0; j < rows_; ++j) {
+        auto& here = cells_[i * rows_ + j];
+        if (here.empty()) continue;
+        const size_t before = here.size();
+        here.erase(std::remove_if(here.begin(), here.end(), [&](const Point& p) { return p.seen < oldest; }),
+                   here.end());
+        count_ -= static_cast<int64_t>(before - here.size());
+        if (here.empty()) continue;
+        first = std::min(first, i), last = std::max(last, i);
+        lowest = std::min(lowest, j), highest = std::max(highest, j);
+      }
+    const int64_t used = last >= first ? (last - first + 1) * (highest - lowest + 1) : 0;
+    if (used > 0 && columns_ * rows_ > 4096 && used * 8 < columns_ * rows_)
+      lay_out(left_ + first - 16, low_ + lowest - 16, last - first + 33, highest - lowest + 33);
+  }
+
+  std::vector<const Point*> in_order() const {
+    std::vector<const Point*> all;
+    for (const auto& here : cells_)
+      for (const Point& p : here) all.push_back(&p);
+    std::sort(all.begin(), all.end(), [](const Point* a, const Point* b) { return a->number < b->number; });
+    return all;
+  }
+
+  // Calls `visit` with each cell of the ring of cells `r` away from (i, j).
+  template <typename Visit>
+  void ring(int64_t i, int64_t j, int64_t r, Visit&& visit) const {
+    const int64_t a0 = std::max(i - r, left_), a1 = std::min(i + r, left_ + columns_ - 1);
+    const int64_t b0 = std::max(j - r, low_), b1 = std::min(j + r, low_ + rows_ - 1);
+    for (int64_t a = a0; a <= a1; ++a) {
+      const std::vector<Point>* column = cells_.data() + (a - left_) * rows_ - low_;
+      if (a == i - r || a == i + r) {
+        for (int64_t b = b0; b <= b1; ++b) visit(column[b]);
+      } else {
+        if (j - r >= low_ && j - r < low_ + rows_) visit(column[j - r]);
+        if (r > 0 && j + r >= low_ && j + r < low_ + rows_) visit(column[j + r]);
+      }
+    }
+  }
+
+  const Point* nearest(double x, double y, double u, double v, double reach) const {
+    const int64_t i = index(x), j = index(y);
+    const double inner = std::min(std::min(x - i * cell_, (i + 1) * cell_ - x),
+                                  std::min(y - j * cell_, (j + 1) * cell_ - y));
+    double best = reach * reach;
+    const Point* found = nullptr;
+    for (int64_t r = 0;; ++r) {
+      const double gap = r == 0 ? 0.0 : inner + (r - 1) * cell_;  // nothing in this ring is nearer
+      if (gap * gap > best || (r > 0 && gap >= reach)) break;
+      ring(i, j, r, [&](const std::vector<Point>& here) {
+        for (const Point& q : here) {
+          const double d = squared(q, x, y, u, v);
+          if (d < best || (found && d == best && q.number < found->number)) best = d, found = &q;
+        }
+      });
+    }
+    return found;
+  }
+
+  bool any_within(double x, double y, double u, double v, double reach) const {
+    const double limit = reach * reach;
+    const int64_t i0 = std::max(index(x - reach), left_), i1 = std::min(index(x + reach), left_ + columns_ - 1);
+    const int64_t j0 = std::max(index(y - reach), low_), j1 = std::min(index(y + reach), low_ + rows_ - 1);
+    for (int64_t i = i0; i <= i1; ++i)
+      for (int64_t j = j0; j <= j1; ++j)
+        for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)])
+          if (squared(q, x, y, u, v) < limit) return true;
+    return false;
+  }
+
+  template <typename Visit>
+  void for_each_near(double x, double y, double reach, Visit&& visit) const {
+    const int64_t i0 = std::max(index(x - reach), left_), i1 = std::min(index(x + reach), left_ + columns_ - 1);
+    const int64_t j0 = std::max(index(y - reach), low_), j1 = std::min(index(y + reach), low_ + rows_ - 1);
+    for (int64_t i = i0; i <= i1; ++i)
+      for (int64_t j = j0; j <= j1; ++j)
+        for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)]) visit(q);
+  }
+
+  Fit align_one(const double* points, const double* normals, size_t n, const double* start, const double* prior,
+                const Settings& p, const int64_t* tags, const In<bool, 2>* corresponding) const {
+    Fit fit{start[0], start[1], start[2], {}};
+    std::array<double, 9> held;  // [1/m², 1/rad²], so that a start without pairs stays
+    for (int e = 0; e < 9; ++e) held[e] = prior[e] + (e % 4 == 0 ? 1e-6 : 0.0);
+    double scale = p.start_scale;
+    const double per_noise = 1 / (p.noise * p.noise);
+    for (int iteration = 0; iteration < p.max_iterations; ++iteration) {
+      std::array<double, 3> gradient{};
+      linearise(points, normals, n, fit, scale, tags, corresponding, gradient);
+      const std::array<double, 3> error{fit.x - start[0], fit.y - start[1], wrap(fit.turn - start[2])};
+      std::array<double, 9> system;
+      std::array<double, 3> force;
+      for (int e = 0; e < 9; ++e) system[e] = fit.information[e] * per_noise + held[e];
+      for (int a = 0; a < 3; ++a)
+        force[a] = gradient[a] * per_noise +
+                   (error[0] * held[a] + error[1] * held[3 + a] + error[2] * held[6 + a]);
+      const std::array<double, 3> step = solve(system, force);
+      fit.x -= step[0], fit.y -= step[1], fit.turn -= step[2];
+      if (scale <= p.end_scale) {
+        const double largest = std::max(std::abs(step[0]), std::max(std::abs(step[1]), std::abs(step[2])));
+        if (largest < p.converged) break;
+      }
+      scale = std::max(p.end_scale, scale * p.shrink);
+    }
+    return fit;
+  }
+
+  // Normal matrix and gradient of the robust point-to-line cost (Geman-McClure) at a pose.
+  void linearise(const double* points, const double* normals, size_t n, Fit& fit, double scale,
+                 const int64_t* tags, const In<bool, 2>* corresponding, std::array<double, 3>& gradient) const {
+    const double c = std::cos(fit.turn), s = std::sin(fit.turn);
+    double xx = 0, xy = 0, xt = 0, yy = 0, yt = 0, tt = 0, gx = 0, gy = 0, gt = 0;
+    for (size_t i = 0; i < n; ++i) {
+      const double* p = points + 2 * i;
+      const double* m = normals + 2 * i;
+      const double ax = c * p[0] - s * p[1], ay = s * p[0] + c * p[1];
+      const double x = fit.x + ax, y = fit.y + ay;
+      const double u = weight_ * (c * m[0] - s * m[1]), v = weight_ * (s * m[0] + c * m[1]);
+      const Point* q = nearest(x, y, u, v, 3 * scale);
+      if (!q) continue;
+      if (corresponding) {
+        if (q->tag < 0 || tags[i] < 0) continue;
+        if (static_cast<size_t>(q->tag) >= corresponding->shape(0) ||
+            static_cast<size_t>(tags[i]) >= corresponding->shape(1))
+          throw std::invalid_argument("corresponding: smaller than the polylines named");
+        if (!corresponding->data()[q->tag * corresponding->shape(1) + tags[i]]) continue;
+      }
+      const double pull = 1 + squared(*q, x, y, u, v) / (scale * scale);
+      const double w = 1 / (pull * pull);
+      const double residual = q->nx * (x - q->x) + q->ny * (y - q->y);
+      const double turning = q->ny * ax - q->nx * ay;
+      xx += w * q->nx * q->nx, xy += w * q->nx * q->ny, xt += w * q->nx * turning;
+      yy += w * q->ny * q->ny, yt += w * q->ny * turning, tt += w * turning * turning;
+      gx += w * q->nx * residual, gy += w * q->ny * residual, gt += w * turning * residual;
+    }
+    fit.information = {xx, xy, xt, xy, yy, yt, xt, yt, tt};
+    gradient = {gx, gy, gt};
+  }
+
+  static constexpr int64_t kMaxCells = int64_t{1} << 26;
+};
+
+}  // namespace point_map
+
+inline void bind_point_map(nb::module_& m) {
+  using point_map::PointMap;
+  using point_map::Settings;
+  nb::class_<Settings>(m, "IcpSettings")
+      .def("__init__",
+           [](Settings* self, double start_scale, double end_scale, double shrink, double converged, double noise,
+              int max_iterations) {
+             new (self) Settings{start_scale, end_scale, shrink, converged, noise, max_iterations};
+           },
+           nb::arg("start_scale"), nb::arg("end_scale"), nb::arg("shrink"), nb::arg("converged"),
+           nb::arg("noise"), nb::arg("max_iterations"));
+  nb::class_<PointMap>(m, "PointMap")
+      .def(nb::init<double, double, double, int64_t>(), nb::arg("normal_weight"), nb::arg("cell"),
+           nb::arg("thin"), nb::arg("blocks"))
+      .def("__len__", &PointMap::size)
+      .def("add", &PointMap::add, nb::arg("points"), nb::arg("normals"), nb::arg("tags") = nb::none())
+      .def("find", &PointMap::find, nb::arg("points"), nb::arg("normals"), nb::arg("reach"))
+      .def("explains", &PointMap::explains, nb::arg("points"), nb::arg("normals"), nb::arg("poses"),
+           nb::arg("reach"))
+      .def("align", &PointMap::align, nb::arg("points"), nb::arg("normals"), nb::arg("starts"), nb::arg("prior"),
+           nb::arg("settings"), nb::arg("tags") = nb::none(), nb::arg("corresponding") = nb::none())
+      .def("content", &PointMap::content)
+      .def("seen_through", &PointMap::seen_through, nb::arg("clear"), nb::arg("first"), nb::arg("spacing"),
+           nb::arg("poses"), nb::arg("clearance"), nb::arg("sight"), nb::arg("far_sight"), nb::arg("facing"))
+      .def("copy", &PointMap::copy);
+}

@@ -1,0 +1,121 @@
+"""The compiled kernels compute what their NumPy twins do."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapweave.kernels import correlative
+from mapweave.kernels.loading import COMPILED
+from mapweave.kernels.point_map import IcpSettings, NumpyPointMap
+from mapweave.kernels.viewpoints import NumpyViewpoints
+
+pytestmark = pytest.mark.skipif(COMPILED is None, reason="no compiled kernels here")
+SETTINGS = (0.35, 0.04, 0.75, 2e-4, 0.1, 25)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def oriented(rng: np.random.Generator, count: int, spread: float = 4.0) -> tuple[np.ndarray, ...]:
+    angle = rng.uniform(-np.pi, np.pi, count)
+    return rng.uniform(-spread, spread, (count, 2)), np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def both(thin: float = 0.0, blocks: int = 5) -> tuple[object, NumpyPointMap]:
+    assert COMPILED is not None
+    return COMPILED.PointMap(0.4, 0.25, thin, blocks), NumpyPointMap(0.4, 0.25, thin, blocks)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.sampled_from([0.0, 0.05, 0.4]), st.integers(0, 9), st.integers(0, 40))
+def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
+    seed: int, thin: float, count: int, size: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    compiled, twin = both(thin)
+    for _ in range(count):
+        block = oriented(rng, size, rng.choice([1.0, 30.0]))
+        tags = rng.integers(-1, 4, size)
+        compiled.add(*block, tags)
+        twin.add(*block, tags)
+    assert len(compiled) == len(twin)
+    for one, other in zip(compiled.content(), twin.content(), strict=True):
+        np.testing.assert_array_equal(one, other)
+    asked = oriented(rng, 30)
+    for one, other in zip(compiled.find(*asked, 1.0), twin.find(*asked, 1.0), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+    poses = rng.uniform(-3, 3, (3, 3))
+    np.testing.assert_array_equal(
+        compiled.explains(*asked, poses, 0.5), twin.explains(*asked, poses, 0.5)
+    )
+    beams = rng.uniform(0, 9, 50), -1.5, 0.06
+    sight = (0.3, 3.0, 6.0, 0.7)
+    np.testing.assert_allclose(
+        compiled.seen_through(*beams, poses, *sight), twin.seen_through(*beams, poses, *sight)
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.booleans())
+def test_alignments_end_at_the_same_poses(seed: int, tagged: bool) -> None:
+    rng = np.random.default_rng(seed)
+    compiled, twin = both()
+    points, normals = oriented(rng, 80, 3.0)
+    tags = rng.integers(-1, 3, 80)
+    for each in (compiled, twin):
+        each.add(points, normals, tags)
+    starts = rng.normal(0, 0.05, (3, 3))
+    prior = np.diag([4.0, 4.0, 8.0])
+    more = (tags, rng.random((3, 3)) < 0.7) if tagged else (None, None)
+    one = compiled.align(points, normals, starts, prior, COMPILED.IcpSettings(*SETTINGS), *more)
+    other = twin.align(points, normals, starts, prior, IcpSettings(*SETTINGS), *more)
+    np.testing.assert_allclose(one[0], other[0], atol=1e-9)
+    np.testing.assert_allclose(one[1], other[1], atol=1e-6, rtol=1e-9)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.integers(0, 12), st.sampled_from([0.01, 0.12, 2 * np.pi / 50]))
+def test_viewpoints_saw_through_the_same(seed: int, count: int, spacing: float) -> None:
+    rng = np.random.default_rng(seed)
+    assert COMPILED is not None
+    compiled, twin = COMPILED.Viewpoints(8), NumpyViewpoints(8)
+    for _ in range(count):
+        scan = rng.uniform(0, 8, 50), -1.4, spacing, rng.uniform(-3, 3, 3)
+        compiled.add(*scan)
+        twin.add(*scan)
+    points, poses = rng.uniform(-5, 5, (40, 2)), rng.uniform(-3, 3, (4, 3))
+    asked = rng.random((4, 40)) < 0.7
+    found = compiled.free(points, poses, asked, 3, 0.3)
+    np.testing.assert_array_equal(found, twin.free(points, poses, asked, 3, 0.3))
+    assert not found[~asked].any()
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.integers(0, 60))
+def test_windows_score_the_same(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    points, origin = rng.uniform(-4, 4, (count, 2)), np.array([-3.0, -3.0])
+    field = correlative.nearness_field(points, origin, 0.1, 60, 0.15)
+    twin = correlative.nearness_field_numpy(points, origin, 0.1, 60, 0.15)
+    np.testing.assert_allclose(field, twin, atol=1e-6)
+    window = rng.uniform(-3, 3, 5), rng.uniform(-1, 1, (4, 2))
+    one = correlative.window_scores(points, twin, origin, 0.1, *window)
+    other = correlative.window_scores_numpy(points, twin, origin, 0.1, *window)
+    np.testing.assert_allclose(one, other, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        lambda m: m.add(np.zeros((2, 2)), np.zeros((3, 2))),
+        lambda m: m.add(np.zeros((2, 3)), np.zeros((2, 3))),
+        lambda m: m.add(np.full((1, 2), np.nan), np.zeros((1, 2))),
+        lambda m: m.add(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(1, dtype=np.int64)),
+        lambda m: m.explains(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((1, 2)), 1.0),
+    ],
+)
+def test_lengths_that_do_not_agree_are_refused(refused: Callable[[object], None]) -> None:
+    for each in both():
+        with pytest.raises(ValueError, match="expected"):
+            refused(each)
