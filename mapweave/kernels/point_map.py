@@ -298,8 +298,8 @@ def before_beams(
     closed = count * spacing > turn - spacing / 2  # the last beam and the first are neighbours
     beam = np.rint(steps).astype(np.int64)
     beam[beam >= count] = 0
-    near: Bools = np.hypot(x, y) < clear[beam] - clearance
-    return near & ((steps <= count - 1) | closed)
+    near = np.hypot(x, y) < clear[beam] - clearance
+    return np.asarray(near & ((steps <= count - 1) | closed), dtype=np.bool_)
 
 
 def _placed(points: Floats, normals: Floats, pose: Floats) -> tuple[Floats, Floats]:

@@ -12,7 +12,8 @@ import scipy
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import Float32Array, FloatArray, IntArray
+from mapweave.geometry.arrays import Float32Array, FloatArray
+from mapweave.kernels.correlative import nearness_field, window_scores
 
 
 class CorrelativeParameters(BaseModel):
@@ -60,13 +61,7 @@ class LikelihoodField:
         """Rasterise (n, 2) `points` [m] in a square about `centre` (2,)."""
         origin = centre - p.half_width
         size = round(2 * p.half_width / p.cell)
-        index = np.floor((points - origin) / p.cell).astype(np.int64)
-        index = index[((index >= 0) & (index < size)).all(axis=1)]
-        empty = np.ones((size + 1, size + 1), dtype=np.bool_)
-        empty[index[:, 0], index[:, 1]] = False
-        distance = scipy.ndimage.distance_transform_edt(empty) * p.cell
-        value = np.exp(-(distance**2) / (2 * p.nearness**2)).astype(np.float32)
-        value[size, :] = value[:, size] = 0
+        value = nearness_field(points, origin, p.cell, size, p.nearness)
         return cls(origin, centre.copy(), p.cell, value)
 
 
@@ -91,11 +86,13 @@ def search(
         points = points[np.linspace(0, len(points) - 1, p.max_points).astype(np.int64)]
     turns = centre[2] + np.arange(-max_turn, max_turn + 1e-9, p.turn_step)
     shifts = np.arange(-p.reach, p.reach + 1e-9, p.step)
-    scores = np.stack(
-        [
-            _translation_scores(points @ se2.rotation(t).T, raster, centre[:2] + shifts[:, None])
-            for t in turns
-        ]
+    scores = window_scores(
+        np.ascontiguousarray(points),
+        raster.value,
+        raster.origin,
+        raster.cell,
+        turns,
+        centre[:2] + shifts[:, None],
     )
     return np.array(
         [
@@ -103,21 +100,6 @@ def search(
             for k, i, j in _separate_maxima(scores, p.candidates)
         ]
     )
-
-
-def _translation_scores(
-    rotated: FloatArray, raster: LikelihoodField, shifts: FloatArray
-) -> Float32Array:
-    """(s, s) mean nearness of `rotated` (n, 2) moved by each pair of `shifts` (s, 2) [m]."""
-    outside = raster.value.shape[0] - 1
-    base: IntArray = np.rint((shifts - raster.origin) / raster.cell).astype(np.int64)
-    cells: IntArray = np.floor(rotated / raster.cell).astype(np.int64)
-    column = base[:, 0, None] + cells[None, :, 0]
-    row = base[:, 1, None] + cells[None, :, 1]
-    column[(column < 0) | (column > outside)] = outside
-    row[(row < 0) | (row > outside)] = outside
-    scores: Float32Array = raster.value[column[:, None, :], row[None, :, :]].mean(axis=-1)
-    return scores
 
 
 def _separate_maxima(scores: Float32Array, count: int) -> list[tuple[int, int, int]]:

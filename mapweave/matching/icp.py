@@ -14,9 +14,11 @@ import numpy as np
 import scipy
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
-from mapweave.scan.points import OrientedPoints, join_points
+from mapweave.kernels.point_map import IcpSettings, PointMap, icp_settings, make_point_map
+from mapweave.scan.points import OrientedPoints
+
+CELL = 0.25  # [m] of the grid that partners are looked up in
 
 
 class IcpParameters(BaseModel):
@@ -48,25 +50,16 @@ class IcpParameters(BaseModel):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """What is aligned to: oriented points, searchable.
+    """What is aligned to: oriented points in the target's frame, searchable."""
 
-    Attributes
-    ----------
-    surface
-        Oriented points in the target's frame.
-    tree
-        Over (n, 4) points and weighted normals.
-    """
-
-    oriented: OrientedPoints
-    tree: "scipy.spatial.KDTree"
+    known: PointMap
 
     @classmethod
     def of(cls, oriented: OrientedPoints, parameters: IcpParameters) -> "Target":
-        """Index `surface`."""
-        return cls(
-            oriented, scipy.spatial.KDTree(_features(oriented, parameters), balanced_tree=False)
-        )
+        """Index `oriented`."""
+        known = make_point_map(parameters.normal_weight, CELL, 0.0, 1)
+        known.add(oriented.points, oriented.normals, oriented.polyline)
+        return cls(known)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,8 +101,6 @@ def align_all(
 ) -> list[Fit]:
     """Move `moving` from each of `starts` (k, 3) until it lies on `target`.
 
-    All at once, because one question to the tree about many points is much faster than many.
-
     Parameters
     ----------
     prior
@@ -121,104 +112,33 @@ def align_all(
         either is on none, the pair is left out, and no farther partner is looked for. Without
         it all pairs pull.
     """
-    poses = np.array(starts, dtype=float)
-    information = np.zeros((len(poses), 3, 3))
-    weakest = np.diag([1e-6, 1e-6, 1e-6])  # [1/m², 1/rad²] so that a start without pairs stays
-    held = weakest if prior is None else prior + weakest
-    scale = parameters.start_scale
-    moves = np.arange(len(poses))  # those that have not settled
-    for _ in range(parameters.max_iterations):
-        pairs = _pairs(moving, target, poses[moves], scale, parameters, corresponding)
-        information[moves], gradient = _linearise(pairs, poses[moves], scale)
-        error = poses[moves] - starts[moves]
-        error[:, 2] = se2.wrap(error[:, 2])
-        system = information[moves] / parameters.noise**2 + held
-        force = gradient / parameters.noise**2 + error @ held
-        step = -np.linalg.solve(system, force[..., None])[..., 0]
-        poses[moves] += step
-        if scale <= parameters.end_scale:
-            moves = moves[np.abs(step).max(axis=1) >= parameters.converged]
-            if len(moves) == 0:
-                break
-        scale = max(parameters.end_scale, scale * parameters.shrink)
-    poses[:, 2] = se2.wrap(poses[:, 2])
+    settings = icp_settings(
+        IcpSettings(
+            parameters.start_scale,
+            parameters.end_scale,
+            parameters.shrink,
+            parameters.converged,
+            parameters.noise,
+            parameters.max_iterations,
+        )
+    )
+    poses, information = target.known.align(
+        moving.points,
+        moving.normals,
+        np.ascontiguousarray(starts, dtype=np.float64),
+        np.zeros((3, 3)) if prior is None else prior,
+        settings,
+        None if corresponding is None else moving.polyline,
+        corresponding,
+    )
     return [Fit(pose, held_by) for pose, held_by in zip(poses, information, strict=True)]
 
 
-def partners(
-    moving: OrientedPoints, target: Target, parameters: IcpParameters, reach: float
-) -> tuple[FloatArray, IntArray]:
+def partners(moving: OrientedPoints, target: Target, reach: float) -> tuple[FloatArray, IntArray]:
     """Return each moving point's distance to its partner and the partner's index.
 
     `moving` is in the target's frame. Without a partner within `reach` [m] the distance is
-    infinite and the index ``len(target.surface)``.
+    infinite and the index ``len(target.known)``.
     """
-    distance, index = target.tree.query(_features(moving, parameters), distance_upper_bound=reach)
-    return np.asarray(distance, dtype=np.float64), np.asarray(index, dtype=np.int64)
-
-
-def _features(oriented: OrientedPoints, parameters: IcpParameters) -> FloatArray:
-    """(n, 4): nearness in place and in normal at once."""
-    return np.hstack([oriented.points, parameters.normal_weight * oriented.normals])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pairs:
-    """Points and their partners, n for each of k poses; those without a partner weigh nothing.
-
-    Attributes
-    ----------
-    points
-        (k, n, 2) moving points, target's frame [m].
-    distance
-        (k, n) to the partner, in place and in normal [m]; infinite without one.
-    residual
-        (k, n) across the partner's surface [m].
-    normals
-        (k, n, 2) of the partners.
-    """
-
-    points: FloatArray
-    distance: FloatArray
-    residual: FloatArray
-    normals: FloatArray
-
-
-def _pairs(
-    moving: OrientedPoints,
-    target: Target,
-    poses: FloatArray,
-    scale: float,
-    parameters: IcpParameters,
-    corresponding: BoolArray | None,
-) -> _Pairs:
-    """Find the partners of all points of `moving` at each of `poses` (k, 3)."""
-    placed = join_points([moving.moved(pose) for pose in poses])
-    distance, index = partners(placed, target, parameters, 3 * scale)
-    index[index == len(target.oriented)] = 0  # any: an infinite distance weighs nothing
-    if corresponding is not None:
-        theirs, ours = target.oriented.polyline[index], placed.polyline
-        pulls = corresponding[theirs, ours] & (theirs >= 0) & (ours >= 0)
-        distance[~pulls] = np.inf
-    normals = target.oriented.normals[index]
-    residual = np.einsum("ij,ij->i", normals, placed.points - target.oriented.points[index])
-    shape = (len(poses), len(moving))
-    return _Pairs(
-        placed.points.reshape(*shape, 2),
-        distance.reshape(shape),
-        residual.reshape(shape),
-        normals.reshape(*shape, 2),
-    )
-
-
-def _linearise(pairs: _Pairs, poses: FloatArray, scale: float) -> tuple[FloatArray, FloatArray]:
-    """Normal matrices (k, 3, 3), gradients (k, 3) of the robust point-to-line cost at `poses`."""
-    weight = 1 / (1 + (pairs.distance / scale) ** 2) ** 2  # Geman-McClure
-    arm = pairs.points - poses[:, None, :2]
-    normals = pairs.normals
-    turning = normals[..., 1] * arm[..., 0] - normals[..., 0] * arm[..., 1]
-    jacobian = np.concatenate([normals, turning[..., None]], axis=-1)
-    weighted = jacobian * weight[..., None]
-    gradient = np.einsum("kni,kn->ki", weighted, pairs.residual)
-    normal_matrix: FloatArray = weighted.transpose(0, 2, 1) @ jacobian
-    return normal_matrix, gradient
+    distance, number = target.known.find(moving.points, moving.normals, reach)
+    return distance, np.where(number < 0, len(target.known), number)

@@ -37,13 +37,18 @@ def seen_through(
     return through
 
 
+def beam_spacing(scan: Scan) -> float:
+    """Return the angle between neighbouring beams [rad]."""
+    return float((scan.angles[-1] - scan.angles[0]) / max(len(scan.angles) - 1, 1))
+
+
 def _beams(scan: Scan, bearing: FloatArray) -> tuple[IntArray, BoolArray]:
     """Return (n,) which beam points nearest to each `bearing` [rad], and whether one does.
 
     Bearings are counted from the first beam on, so that it does not matter where a turn begins.
     """
     count = len(scan.angles)
-    spacing = (scan.angles[-1] - scan.angles[0]) / max(count - 1, 1)
+    spacing = beam_spacing(scan)
     turn = 2 * np.pi
     steps = np.mod(bearing - scan.angles[0], turn) / spacing
     closed = count * spacing > turn - spacing / 2  # the last beam and the first are neighbours

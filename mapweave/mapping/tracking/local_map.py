@@ -4,7 +4,6 @@ Returns that lie on known surfaces speak for a pose; returns inside what earlier
 and known surfaces that the new scan sees through, speak against it.
 """
 
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.kernels.point_map import make_point_map
+from mapweave.kernels.viewpoints import make_viewpoints
 from mapweave.matching.correlative import CorrelativeParameters, LikelihoodField, search
-from mapweave.matching.icp import IcpParameters, Target, partners
-from mapweave.scan.points import OrientedPoints, join_points
+from mapweave.matching.icp import CELL, IcpParameters, Target
+from mapweave.scan.points import OrientedPoints
 from mapweave.scan.scan import Scan
-from mapweave.scan.visibility import seen_through
+from mapweave.scan.visibility import beam_spacing, clear_ranges
 
 
 class LocalMapParameters(BaseModel):
@@ -29,6 +30,11 @@ class LocalMapParameters(BaseModel):
     keyframes: int = Field(60, ge=1, description="how many are remembered: some 15-20 m of path")
     keyframe_step: float = Field(0.3, gt=0, description="[m] of motion that makes a new one")
     keyframe_turn: float = Field(0.26, gt=0, description="[rad] of rotation that makes one: 15°")
+    thin: float = Field(
+        0.03,
+        ge=0,
+        description="[m] within which a point is one that was seen before: a laser's noise",
+    )
     witnesses: int = Field(12, ge=1, description="nearest keyframes asked what they saw through")
     overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
     clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
@@ -80,55 +86,48 @@ class ScanEvidence:
         return against / max(self.explained + against, 1e-9)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Keyframe:
-    """A remembered scan at its pose (3,), with its surface in the tracking frame."""
-
-    scan: Scan
-    pose: FloatArray
-    oriented: OrientedPoints
-
-
 class LocalMap:
     """The last keyframes; empty until the first is remembered."""
 
     def __init__(self, parameters: LocalMapParameters) -> None:
-        self._parameters = parameters
-        self._keyframes: deque[Keyframe] = deque(maxlen=parameters.keyframes)
-        self._target: Target | None = None
+        p = self._parameters = parameters
+        self._known = make_point_map(p.icp.normal_weight, CELL, p.thin, p.keyframes)
+        self._viewpoints = make_viewpoints(p.keyframes)
+        self._last: FloatArray | None = None
         self._raster: LikelihoodField | None = None
 
     def copy(self) -> "LocalMap":
         """Return one that remembers by itself from now on."""
         other = LocalMap(self._parameters)
-        other._keyframes = self._keyframes.copy()
-        other._target, other._raster = self._target, self._raster
+        other._known, other._viewpoints = self._known.copy(), self._viewpoints.copy()
+        other._last, other._raster = self._last, self._raster
         return other
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing was remembered yet."""
-        return not self._keyframes
+        return self._last is None
 
     @property
     def target(self) -> Target:
         """What scans are aligned to; there is none while the map is empty."""
-        if self._target is None:
-            oriented = join_points([k.oriented for k in self._keyframes])
-            self._target = Target.of(oriented, self._parameters.icp)
-        return self._target
+        return Target(self._known)
 
     def remember(self, scan: Scan, oriented: OrientedPoints, pose: FloatArray) -> None:
         """Add a scan taken at `pose` (3,), unless it was taken about where the last one was.
 
         Parameters
         ----------
-        surface
+        oriented
             Its oriented points, sensor frame.
         """
-        if self._is_news(pose):
-            self._keyframes.append(Keyframe(scan, pose, oriented.moved(pose)))
-            self._target = self._raster = None
+        if not self._is_news(pose):
+            return
+        placed, p = oriented.moved(pose), self._parameters
+        self._known.add(placed.points, placed.normals)
+        clear = clear_ranges(scan, p.far_sight)
+        self._viewpoints.add(clear, float(scan.angles[0]), beam_spacing(scan), pose)
+        self._last, self._raster = pose, None
 
     def search(self, points: FloatArray, centre: FloatArray, max_turn: float) -> FloatArray:
         """Return the (k, 3) best poses for (n, 2) `points` in a window about `centre` (3,)."""
@@ -139,7 +138,7 @@ class LocalMap:
         """Return a raster about `centre`, made anew only where it has moved away."""
         p = self._parameters.search
         if self._raster is None or np.abs(self._raster.centre - centre[:2]).max() > p.reach:
-            self._raster = LikelihoodField.of(self.target.oriented.points, centre[:2], p)
+            self._raster = LikelihoodField.of(self._known.content()[0], centre[:2], p)
         return self._raster
 
     def evidence(
@@ -153,48 +152,29 @@ class LocalMap:
             The oriented points of `scan`, sensor frame.
         """
         p = self._parameters
-        placed = join_points([oriented.moved(pose) for pose in poses])
-        distance, _ = partners(placed, self.target, p.icp, p.overlap)
-        explained = np.isfinite(distance).reshape(len(poses), -1)
+        explained = self._known.explains(oriented.points, oriented.normals, poses, p.overlap)
         judged = _faced(oriented, p) | (np.hypot(*oriented.points.T) < p.sight)
-        free = self._free_before(placed.points.reshape(*explained.shape, 2), poses)
-        contradicted = ~explained & free & judged
-        through = self._seen_through(scan, poses)
+        asked = ~explained & judged
+        contradicted = self._viewpoints.free(
+            oriented.points, poses, asked, p.witnesses, p.clearance
+        )
+        through = self._known.seen_through(
+            clear_ranges(scan, p.far_sight),
+            float(scan.angles[0]),
+            beam_spacing(scan),
+            poses,
+            p.clearance,
+            p.sight,
+            p.far_sight,
+            p.facing,
+        )
         shares = zip(explained.mean(axis=1), contradicted.mean(axis=1), through, strict=True)
         return [ScanEvidence(float(e), float(c), float(t)) for e, c, t in shares]
 
-    def _seen_through(self, scan: Scan, poses: FloatArray) -> FloatArray:
-        """(k,) share of the known points in sight that `scan` saw through from each pose."""
-        p = self._parameters
-        known = self.target.oriented.at(slice(None, None, 3))
-        shares = np.zeros(len(poses))
-        for k, pose in enumerate(poses):
-            local = known.moved(se2.inverse(pose))
-            near = np.hypot(*local.points.T) < p.sight
-            local = local.at(near | _faced(local, p))
-            if len(local):
-                through = seen_through(scan, local.points, p.clearance, p.far_sight)
-                shares[k] = through.mean()
-        return shares
-
-    def _free_before(self, points: FloatArray, poses: FloatArray) -> BoolArray:
-        """(k, n) which `points` (k, n, 2) were seen through by the keyframes about their pose."""
-        p = self._parameters
-        places = np.array([keyframe.pose[:2] for keyframe in self._keyframes])
-        distance = np.hypot(*(places[:, None] - poses[None, :, :2]).T)
-        asked = np.argsort(distance, axis=1, kind="stable")[:, : p.witnesses]
-        free = np.zeros(points.shape[:2], dtype=np.bool_)
-        for k in np.unique(asked):
-            keyframe, of = self._keyframes[int(k)], (asked == k).any(axis=1)
-            local = se2.transform_points(se2.inverse(keyframe.pose), points[of])
-            through = seen_through(keyframe.scan, local.reshape(-1, 2), p.clearance, p.far_sight)
-            free[of] |= through.reshape(local.shape[:2])
-        return free
-
     def _is_news(self, pose: FloatArray) -> bool:
-        if not self._keyframes:
+        if self._last is None:
             return True
-        x, y, turn = se2.between(self._keyframes[-1].pose, pose)
+        x, y, turn = se2.between(self._last, pose)
         p = self._parameters
         return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
 
