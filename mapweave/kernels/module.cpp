@@ -3,6 +3,7 @@
 
 #include "correlative.hpp"
 #include "point_map.hpp"
+#include "segmentation.hpp"
 #include "viewpoints.hpp"
 
 namespace nb = nanobind;
@@ -11,5 +12,6 @@ NB_MODULE(_compiled, m) {
   m.doc() = "Compiled inner loops; see the modules beside for what they compute.";
   bind_correlative(m);
   bind_point_map(m);
+  bind_segmentation(m);
   bind_viewpoints(m);
 }

@@ -225,7 +225,7 @@ def _merged(
     growing = SubmapBuilder(parameters)
     known = np.tile(EXACT, (len(poses), 1)) if uncertainty is None else uncertainty
     for seen, pose, each in zip(scans, poses, known, strict=True):
-        growing.add(seen.scan, seen.lines.segments, pose, each)
+        growing.add(seen.scan, seen.segments, pose, each)
     return growing
 
 

@@ -215,7 +215,7 @@ class Mapper:
         local = se2.between(self._frame, tracked.pose)
         held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
         held = turn_uncertainty(held, -self._frame[2])
-        self._growing.add(seen.scan, seen.lines.segments, local, held)
+        self._growing.add(seen.scan, seen.segments, local, held)
         self._merged[seen.scan.index] = seen
         self._version += 1
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.kernels.segmentation import orient
 from mapweave.maps import LineMap
 from mapweave.scan.scan import Scan
 from mapweave.scan.segmentation import ScanSegments
@@ -28,7 +29,7 @@ class OrientedPoints:
     normals
         (n, 2) unit vectors towards the visible side.
     polyline
-        (n,) the generalized polyline each point is on; -1 for none.
+        (n,) the generalized polyline, or the segment, that each point is on; -1 for none.
     """
 
     points: FloatArray
@@ -65,62 +66,36 @@ def left_normals(directions: FloatArray) -> FloatArray:
     return normals
 
 
-def scan_surface(
-    scan: Scan, segments: ScanSegments, polyline: IntArray, max_range: float
-) -> OrientedPoints:
-    """Return the oriented points of `scan` up to `max_range` [m], sensor frame.
+def scan_points(
+    scan: Scan, segments: ScanSegments, max_range: float, spacing: float
+) -> tuple[OrientedPoints, OrientedPoints]:
+    """Return the oriented points of `scan`, and points between them on its segments.
 
-    `polyline` (n,) names the generalized polyline of each of the n segments.
-
-    A return on a segment takes the segment's normal; another, its neighbours'. Returns without
-    a neighbour near enough have no direction and are left out.
-    """
-    with np.errstate(invalid="ignore"):
-        used = np.flatnonzero(scan.hits & (scan.ranges <= max_range))
-    points = scan.points[used]
-    if len(used) < 2:
-        return OrientedPoints(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=np.int64))
-    directions = _neighbour_directions(points)
-    label = segments.label[used]
-    on_segment = label >= 0
-    lines = segments.segments[label[on_segment]]
-    directions[on_segment] = lines[:, 2:] - lines[:, :2]
-    of_polyline = np.full(len(used), -1)
-    of_polyline[on_segment] = polyline[label[on_segment]]
-    oriented = np.hypot(*directions.T) > 0
-    return OrientedPoints(
-        points[oriented], left_normals(directions[oriented]), of_polyline[oriented]
-    )
-
-
-def surface_between(
-    scan: Scan, segments: ScanSegments, polyline: IntArray, max_range: float, spacing: float
-) -> OrientedPoints:
-    """Return oriented points between the returns of `scan` on each segment, sensor frame.
+    Sensor frame; `polyline` names the segment that each is on. A return on a segment takes the
+    segment's normal; another, its neighbours'. Returns without a neighbour near enough have no
+    direction and are left out.
 
     Far along a wall the returns are metres apart. Were they all that is remembered of it, a later
-    scan would fit best where its returns fall on the same places again: where nothing moved.
+    scan would fit best where its returns fall on the same places again: where nothing moved. So
+    there are points between.
 
     Parameters
     ----------
-    polyline
-        (n,) the generalized polyline of each of the n segments.
+    max_range
+        [m] farther returns are left out.
     spacing
-        [m] that two neighbouring points are apart at the most, returns included.
+        [m] that two neighbouring points on a segment are apart at the most, returns included.
     """
-    with np.errstate(invalid="ignore"):
-        used = np.flatnonzero((segments.label >= 0) & (scan.ranges <= max_range))
-    points, label = scan.points[used], segments.label[used]
-    step = np.diff(points, axis=0)
-    count = np.maximum(0, np.ceil(np.hypot(*step.T) / spacing).astype(np.int64) - 1)
-    count[label[1:] != label[:-1]] = 0
-    owner = np.repeat(np.arange(len(count)), count)
-    rank = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    fraction = (rank + 1) / (count[owner] + 1)
-    lines = segments.segments[label[owner]]
-    normals = left_normals(lines[:, 2:] - lines[:, :2])
-    between = points[owner] + fraction[:, None] * step[owner]
-    return OrientedPoints(between, normals, polyline[label[owner]])
+    returns, between = orient(
+        scan.angles,
+        scan.ranges,
+        segments.segments,
+        segments.label,
+        max_range,
+        MAX_NEIGHBOUR_GAP,
+        spacing,
+    )
+    return OrientedPoints(*returns), OrientedPoints(*between)
 
 
 def points_on_lines(lines: LineMap, spacing: float) -> tuple[OrientedPoints, IntArray]:
@@ -137,11 +112,3 @@ def points_on_lines(lines: LineMap, spacing: float) -> tuple[OrientedPoints, Int
     fraction = (rank + 0.5) / counts[owner]
     points = segments[owner, :2] + fraction[:, None] * directions[owner]
     return OrientedPoints(points, left_normals(directions)[owner], lines.polyline[owner]), owner
-
-
-def _neighbour_directions(points: FloatArray) -> FloatArray:
-    """(n, 2) from the previous to the next return; zero where both are too far away."""
-    forward = np.vstack([np.diff(points, axis=0), np.zeros((1, 2))])
-    forward[np.hypot(*forward.T) > MAX_NEIGHBOUR_GAP] = 0
-    directions: FloatArray = forward + np.vstack([np.zeros((1, 2)), forward[:-1]])
-    return directions

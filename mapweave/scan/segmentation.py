@@ -6,15 +6,16 @@ again, and every piece is fitted by total least squares. Beams run counter-clock
 in beam order has the sensor, and with it the visible side, on its left.
 """
 
-import math
 from dataclasses import dataclass
-from itertools import pairwise
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.kernels import segmentation
+from mapweave.kernels.segmentation import SegmentationSettings, fit_segment
 from mapweave.scan.scan import Scan
+
+__all__ = ["ScanSegments", "SegmentationParameters", "extract_segments", "fit_segment"]
 
 
 class SegmentationParameters(BaseModel):
@@ -63,104 +64,13 @@ class ScanSegments:
 def extract_segments(scan: Scan, parameters: SegmentationParameters | None = None) -> ScanSegments:
     """Approximate the returns of `scan` by directed line segments (paper, V, first step)."""
     p = parameters or SegmentationParameters()
-    with np.errstate(invalid="ignore"):
-        used = np.flatnonzero(scan.hits & (scan.ranges <= p.max_range))
-    label = np.full(len(scan.ranges), -1)
-    points = scan.points[used]
-    tolerance = p.tolerance + p.relative_tolerance * scan.ranges[used]
-    segments: list[FloatArray] = []
-    for first, last in _runs(_breaks(scan, used, points, p), len(used)):
-        pieces = _straight_pieces(points, tolerance, first, last)
-        pieces = [(a, b) for a, b in pieces if b - a >= p.min_points]
-        for a, b in _merged_pieces(points, tolerance, pieces):
-            segment = fit_segment(points[a:b])
-            if np.hypot(*(segment[2:] - segment[:2])) >= p.min_length:
-                label[used[a:b]] = len(segments)
-                segments.append(segment)
-    return ScanSegments(np.array(segments).reshape(-1, 4), label)
-
-
-def fit_segment(points: FloatArray) -> FloatArray:
-    """Return the (4,) total-least-squares segment of (k, 2) `points`, along their order."""
-    centre, direction = _fit_line(points)
-    along = (points - centre) @ direction
-    return np.concatenate([centre + along.min() * direction, centre + along.max() * direction])
-
-
-def _fit_line(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Centre (2,) and unit direction (2,) of the line of least squares across `points`."""
-    centre: FloatArray = points.sum(axis=0) / len(points)
-    offsets = points - centre
-    (xx, xy), (_, yy) = (offsets.T @ offsets).tolist()
-    angle = 0.5 * math.atan2(2 * xy, xx - yy)  # the major axis of the scatter matrix
-    direction = np.array([math.cos(angle), math.sin(angle)])
-    return centre, -direction if direction @ (points[-1] - points[0]) < 0 else direction
-
-
-def _breaks(scan: Scan, used: IntArray, points: FloatArray, p: SegmentationParameters) -> BoolArray:
-    """(m - 1,) where one surface ends: consecutive used returns too far apart."""
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    turn = np.diff(scan.angles[used])
-    nearer = np.minimum(scan.ranges[used][1:], scan.ranges[used][:-1])
-    limit = np.maximum(p.max_jump, nearer * turn / np.sin(p.grazing))
-    skipped = np.diff(used) > 3
-    broken: BoolArray = (steps > np.minimum(limit, 4 * p.max_jump)) | skipped
-    return broken
-
-
-def _runs(breaks: BoolArray, count: int) -> list[tuple[int, int]]:
-    """Half-open index ranges between breaks."""
-    if count == 0:
-        return []
-    edges = [0, *(np.flatnonzero(breaks) + 1).tolist(), count]
-    return list(pairwise(edges))
-
-
-def _straight_pieces(
-    points: FloatArray, tolerance: FloatArray, first: int, last: int
-) -> list[tuple[int, int]]:
-    """Split [first, last) at the return farthest from the chord until all are straight."""
-    pieces: list[tuple[int, int]] = []
-    stack = [(first, last)]
-    while stack:
-        a, b = stack.pop()
-        if b - a <= 2:
-            pieces.append((a, b))
-            continue
-        chord = points[b - 1] - points[a]
-        offsets = points[a:b] - points[a]
-        length = max(float(np.hypot(*chord)), 1e-9)
-        deviation = np.abs(chord[0] * offsets[:, 1] - chord[1] * offsets[:, 0]) / length
-        excess = deviation / tolerance[a:b]
-        worst = int(excess.argmax())
-        if excess[worst] <= 1 or worst in (0, b - a - 1):
-            pieces.append((a, b))
-        else:
-            # The corner belongs to both sides, so that polylines stay connected there.
-            stack.append((a + worst, b))
-            stack.append((a, a + worst + 1))
-    return sorted(pieces)
-
-
-def _merged_pieces(
-    points: FloatArray, tolerance: FloatArray, pieces: list[tuple[int, int]]
-) -> list[tuple[int, int]]:
-    """Merge pieces that share a corner and are straight together.
-
-    A chord runs between two single returns; with those in error a straight wall was split.
-    """
-    merged = pieces[:1]
-    for a, b in pieces[1:]:
-        first = merged[-1][0]
-        touches = a < merged[-1][1]
-        if touches and _is_straight(points[first:b], tolerance[first:b]):
-            merged[-1] = (first, b)
-        else:
-            merged.append((a, b))
-    return merged
-
-
-def _is_straight(points: FloatArray, tolerance: FloatArray) -> bool:
-    """Whether all (k, 2) `points` lie within (k,) `tolerance` [m] of the line that fits best."""
-    centre, (x, y) = _fit_line(points)
-    return bool((np.abs((points - centre) @ np.array([-y, x])) <= tolerance).all())
+    settings = SegmentationSettings(
+        p.max_range,
+        p.max_jump,
+        p.grazing,
+        p.tolerance,
+        p.relative_tolerance,
+        p.min_points,
+        p.min_length,
+    )
+    return ScanSegments(*segmentation.extract_segments(scan.angles, scan.ranges, settings))

@@ -264,7 +264,7 @@ class Tracker:
             target = Target.of(
                 oriented.at(np.isin(oriented.polyline, partners_of)), p.local_map.icp
             )
-            moving = seen.oriented.at(seen.oriented.polyline >= 0)
+            moving = seen.on_lines
             fit = align(moving, target, found.transform, p.local_map.icp, None, found.corresponding)
             starts.append(fit.pose)
         return np.array(starts).reshape(-1, 3)

@@ -114,7 +114,7 @@ def test_points_on_no_polyline_have_no_part_where_a_correspondence_is_given() ->
 
 def test_partners_are_the_nearest_in_place_and_normal(rng: Generator) -> None:
     moving = ROOMS.at(slice(None, None, 7)).moved(np.array([0.05, -0.02, 0.01]))
-    distance, index = partners(moving, Target.of(ROOMS, P), P, 0.3)
+    distance, index = partners(moving, Target.of(ROOMS, P), 0.3)
     for k in rng.integers(0, len(moving), 40):
         place = ((ROOMS.points - moving.points[k]) ** 2).sum(axis=1)
         normal = ((ROOMS.normals - moving.normals[k]) ** 2).sum(axis=1)
@@ -125,5 +125,5 @@ def test_partners_are_the_nearest_in_place_and_normal(rng: Generator) -> None:
 
 def test_what_is_out_of_reach_has_no_partner() -> None:
     room = surface_of(walls_of(rectangle(0, 0, 3, 3)))
-    distance, index = partners(room.moved(np.array([50.0, 0, 0])), Target.of(room, P), P, 0.5)
+    distance, index = partners(room.moved(np.array([50.0, 0, 0])), Target.of(room, P), 0.5)
     assert np.isinf(distance).all() and (index == len(room)).all()

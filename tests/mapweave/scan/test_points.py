@@ -5,7 +5,7 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.mapping.tracking.observation import ObservationParameters, observe
-from mapweave.scan.points import join_points, left_normals, points_on_lines, scan_surface
+from mapweave.scan.points import join_points, left_normals, points_on_lines, scan_points
 from mapweave.scan.segmentation import extract_segments
 from tests.mapweave.buildings import (
     AROUND,
@@ -48,8 +48,7 @@ def test_the_normals_of_a_scan_are_those_of_the_walls(rng: Generator) -> None:
 def test_every_return_up_to_the_range_becomes_a_point_and_no_other(rng: Generator) -> None:
     scan = cast(walls_of(BUILDING), [9, 1, 0.3], noise=rng)
     segments = extract_segments(scan)
-    polyline = np.zeros(len(segments.segments), dtype=np.int64)
-    seen = scan_surface(scan, segments, polyline, 6.0)
+    seen, _ = scan_points(scan, segments, 6.0, 0.2)
     assert np.hypot(*seen.points.T).max() <= 6.0
     near = (scan.ranges <= 6.0) & (segments.label >= 0)
     assert len(seen) >= near.sum()

@@ -25,7 +25,7 @@ def test_a_points_polyline_is_that_of_the_line_it_lies_on(rng: Generator) -> Non
     seen = observe(scan, ObservationParameters())
     lines = seen.lines
     for polyline in np.unique(lines.polyline):
-        points = seen.oriented.points[seen.oriented.polyline == polyline]
+        points = seen.on_lines.points[seen.on_lines.polyline == polyline]
         own = lines.segments[lines.polyline == polyline]
         normals = left_normals(own[:, 2:] - own[:, :2])
         across = np.abs(np.einsum("psj,sj->ps", points[:, None] - own[None, :, :2], normals))

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapweave.kernels import correlative
+from mapweave.kernels import correlative, segmentation
 from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.point_map import IcpSettings, NumpyPointMap
+from mapweave.kernels.segmentation import SegmentationSettings
 from mapweave.kernels.viewpoints import NumpyViewpoints
 
 pytestmark = pytest.mark.skipif(COMPILED is None, reason="no compiled kernels here")
@@ -119,3 +120,23 @@ def test_lengths_that_do_not_agree_are_refused(refused: Callable[[object], None]
     for each in both():
         with pytest.raises(ValueError, match="expected"):
             refused(each)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.integers(0, 90), st.sampled_from([0.0, 0.02, 0.3]))
+def test_scans_are_segmented_and_oriented_alike(seed: int, beams: int, noise: float) -> None:
+    rng = np.random.default_rng(seed)
+    angles = np.linspace(-1.5, 1.5, beams) if beams else np.empty(0)
+    walls = np.minimum(4 / np.maximum(np.cos(angles), 0.1), 6 / np.maximum(np.sin(angles), 0.1))
+    ranges = np.where(rng.random(beams) < 0.1, np.nan, walls + rng.normal(0, noise, beams))
+    chosen = SegmentationSettings(30.0, 0.25, 0.12, 0.04, 0.004, 3, 0.1)
+    one = segmentation.extract_segments(angles, ranges, chosen)
+    other = segmentation.extract_segments_numpy(angles, ranges, chosen)
+    np.testing.assert_allclose(one[0], other[0], atol=1e-9)
+    np.testing.assert_array_equal(one[1], other[1])
+    rest = *other, 25.0, 0.5, 0.2
+    points = segmentation.orient(angles, ranges, *rest)
+    twins = segmentation.orient_numpy(angles, ranges, *rest)
+    for a, b in zip(points, twins, strict=True):
+        for c, d in zip(a, b, strict=True):
+            np.testing.assert_allclose(c, d, atol=1e-9)
