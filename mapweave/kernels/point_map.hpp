@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -22,8 +23,12 @@ struct Point {
   double x, y, u, v;  // place [m], normal times its weight [m]
   double nx, ny;      // unit normal
   int64_t number;     // in the order of adding
-  int64_t seen;       // block in which it was seen last
   int32_t tag;        // polyline, -1 for none
+};
+
+struct Known {
+  double x, y, nx, ny;
+  int64_t seen;  // block in which it was seen last; -1 once it is forgotten
 };
 
 struct Settings {
@@ -67,22 +72,25 @@ class PointMap {
       const double* p = points.data() + 2 * i;
       const double* m = normals.data() + 2 * i;
       if (!(std::isfinite(p[0]) && std::isfinite(p[1]))) throw std::invalid_argument("points: finite numbers expected");
-      Point point{p[0], p[1], weight_ * m[0], weight_ * m[1], m[0], m[1], 0, block_, -1};
+      Point point{p[0], p[1], weight_ * m[0], weight_ * m[1], m[0], m[1], 0, -1};
       if (tags) point.tag = static_cast<int32_t>(tags->data()[i]);
-      Point* like = thin_ > 0 ? const_cast<Point*>(nearest(point.x, point.y, point.u, point.v, thin_)) : nullptr;
+      const Point* like = thin_ > 0 ? nearest(point.x, point.y, point.u, point.v, thin_) : nullptr;
       if (like)
-        like->seen = block_;
+        renew(like->number);
       else
         fresh.push_back(point);
     }
     for (Point& point : fresh) {  // afterwards: a block's own points do not thin each other
-      point.number = next_++;
+      point.number = first_ + static_cast<int64_t>(known_.size());
       reach_out(point.x, point.y);
       cells_[cell_of(point.x, point.y)].push_back(point);
+      known_.push_back({point.x, point.y, point.nx, point.ny, block_});
+      seen_in_.back().push_back(point.number);
       ++count_;
     }
     ++block_;
     forget();
+    seen_in_.emplace_back();
   }
 
   // (n,) distance to the nearest point, place and normal at once, and its number.
@@ -141,20 +149,22 @@ class PointMap {
 
   // (n, 2) points and (n, 2) normals that are there, in the order of adding.
   nb::tuple content() const {
-    std::vector<const Point*> all = in_order();
     std::vector<double> points, normals;
-    for (const Point* p : all) {
-      points.insert(points.end(), {p->x, p->y});
-      normals.insert(normals.end(), {p->nx, p->ny});
+    for (const Known& q : known_) {
+      if (q.seen < 0) continue;
+      points.insert(points.end(), {q.x, q.y});
+      normals.insert(normals.end(), {q.nx, q.ny});
     }
-    const size_t n = all.size();
+    const size_t n = points.size() / 2;
     return nb::make_tuple(give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}));
   }
 
   // (k,) of the points in sight from each pose, the share that lie before what the beams hit.
   Out<double> seen_through(In<double, 1> clear, double first, double spacing, In<double, 2> poses,
-                           double clearance, double sight, double far_sight, double facing) const {
+                           double clearance, double sight, double far_sight, double facing,
+                           int64_t every) const {
     const size_t k = check_poses(poses);
+    if (every < 1 || clear.shape(0) < 1) throw std::invalid_argument("every: 1 or more, clear: a beam or more expected");
     const int64_t beams = static_cast<int64_t>(clear.shape(0));
     const bool closed = beams * spacing > kTurn - spacing / 2;
     std::vector<double> shares(k, 0.0);
@@ -162,24 +172,27 @@ class PointMap {
       const double* pose = poses.data() + 3 * j;
       const double c = std::cos(pose[2]), s = std::sin(pose[2]);
       int64_t in_sight = 0, through = 0;
-      for_each_near(pose[0], pose[1], std::max(sight, far_sight), [&](const Point& q) {
+      for (size_t i = static_cast<size_t>((every - first_ % every) % every); i < known_.size();
+           i += static_cast<size_t>(every)) {
+        const Known& q = known_[i];
+        if (q.seen < 0) continue;
         const double dx = q.x - pose[0], dy = q.y - pose[1];
         const double squared = dx * dx + dy * dy;
         if (squared >= sight * sight) {
-          if (squared >= far_sight * far_sight) return;
+          if (squared >= far_sight * far_sight) continue;
           const double ahead = -(dx * q.nx + dy * q.ny);
-          if (!(ahead > 0 && ahead * ahead > facing * facing * squared)) return;
+          if (!(ahead > 0 && ahead * ahead > facing * facing * squared)) continue;
         }
         ++in_sight;
         double steps = std::fmod(std::atan2(c * dy - s * dx, c * dx + s * dy) - first, kTurn);
         if (steps < 0) steps += kTurn;
         steps /= spacing;
-        if (!(steps <= beams - 1 || closed)) return;
+        if (!(steps <= beams - 1 || closed)) continue;
         int64_t beam = std::llrint(steps);
         if (beam >= beams) beam = 0;
         const double before = clear.data()[beam] - clearance;
         if (before > 0 && squared < before * before) ++through;
-      });
+      }
       if (in_sight) shares[j] = static_cast<double>(through) / static_cast<double>(in_sight);
     }
     return give(std::move(shares), {k});
@@ -189,7 +202,9 @@ class PointMap {
 
  private:
   double weight_, cell_, thin_;
-  int64_t blocks_, block_ = 0, next_ = 0, count_ = 0;
+  int64_t blocks_, block_ = 0, count_ = 0, first_ = 0;
+  std::deque<Known> known_;                             // by number, from first_ on
+  std::deque<std::vector<int64_t>> seen_in_ = {{}};     // numbers seen in each of the last blocks
   int64_t left_ = 0, low_ = 0, columns_ = 0, rows_ = 0;  // the cells there are
   std::vector<std::vector<Point>> cells_;
 
@@ -218,7 +233,7 @@ class PointMap {
   void reach_out(double x, double y) {
     const int64_t i = index(x), j = index(y);
     if (i >= left_ && i < left_ + columns_ && j >= low_ && j < low_ + rows_) return;
-    const int64_t margin = 16;
+    const int64_t margin = kMargin;
     int64_t left = i - margin, right = i + margin, low = j - margin, high = j + margin;
     if (columns_ > 0) {
       left = std::min(left_, i < left_ ? i - margin - columns_ / 2 : left_);
@@ -242,34 +257,41 @@ class PointMap {
     left_ = left, low_ = low, columns_ = columns, rows_ = rows;
   }
 
-  // Forgets points that the last blocks did not see; gives back cells where nothing is left.
+  void renew(int64_t number) {
+    Known& known = known_[static_cast<size_t>(number - first_)];
+    if (known.seen == block_) return;
+    known.seen = block_;
+    seen_in_.back().push_back(number);
+  }
+
+  // Forgets points that the last blocks did not see; gives back cells far from what is left.
   void forget() {
-    const int64_t oldest = block_ - blocks_;
-    if (oldest <= 0) return;
+    if (static_cast<int64_t>(seen_in_.size()) <= blocks_) return;
+    const int64_t oldest = block_ - static_cast<int64_t>(seen_in_.size());
+    for (const int64_t number : seen_in_.front()) {
+      Known& known = known_[static_cast<size_t>(number - first_)];
+      if (known.seen != oldest) continue;
+      known.seen = -1;
+      auto& here = cells_[cell_of(known.x, known.y)];
+      here.erase(std::find_if(here.begin(), here.end(), [&](const Point& p) { return p.number == number; }));
+      --count_;
+    }
+    seen_in_.pop_front();
+    while (!known_.empty() && known_.front().seen < 0) known_.pop_front(), ++first_;
+    if (block_ % blocks_ == 0) shrink();
+  }
+
+  void shrink() {
     int64_t first = columns_, last = -1, lowest = rows_, highest = -1;
     for (int64_t i = 0; i < columns_; ++i)
       for (int64_t j = 0; j < rows_; ++j) {
-        auto& here = cells_[i * rows_ + j];
-        if (here.empty()) continue;
-        const size_t before = here.size();
-        here.erase(std::remove_if(here.begin(), here.end(), [&](const Point& p) { return p.seen < oldest; }),
-                   here.end());
-        count_ -= static_cast<int64_t>(before - here.size());
-        if (here.empty()) continue;
+        if (cells_[i * rows_ + j].empty()) continue;
         first = std::min(first, i), last = std::max(last, i);
         lowest = std::min(lowest, j), highest = std::max(highest, j);
       }
-    const int64_t used = last >= first ? (last - first + 1) * (highest - lowest + 1) : 0;
-    if (used > 0 && columns_ * rows_ > 4096 && used * 8 < columns_ * rows_)
-      lay_out(left_ + first - 16, low_ + lowest - 16, last - first + 33, highest - lowest + 33);
-  }
-
-  std::vector<const Point*> in_order() const {
-    std::vector<const Point*> all;
-    for (const auto& here : cells_)
-      for (const Point& p : here) all.push_back(&p);
-    std::sort(all.begin(), all.end(), [](const Point* a, const Point* b) { return a->number < b->number; });
-    return all;
+    if (last < first) return;
+    const int64_t columns = last - first + 1 + 2 * kMargin, rows = highest - lowest + 1 + 2 * kMargin;
+    if (columns * rows * 2 < columns_ * rows_) lay_out(left_ + first - kMargin, low_ + lowest - kMargin, columns, rows);
   }
 
   // Calls `visit` with each cell of the ring of cells `r` away from (i, j).
@@ -288,12 +310,16 @@ class PointMap {
     }
   }
 
-  const Point* nearest(double x, double y, double u, double v, double reach) const {
+  const Point* nearest(double x, double y, double u, double v, double reach, const Point* guess = nullptr) const {
     const int64_t i = index(x), j = index(y);
     const double inner = std::min(std::min(x - i * cell_, (i + 1) * cell_ - x),
                                   std::min(y - j * cell_, (j + 1) * cell_ - y));
     double best = reach * reach;
     const Point* found = nullptr;
+    if (guess) {
+      const double d = squared(*guess, x, y, u, v);
+      if (d < best) best = d, found = guess;
+    }
     for (int64_t r = 0;; ++r) {
       const double gap = r == 0 ? 0.0 : inner + (r - 1) * cell_;  // nothing in this ring is nearer
       if (gap * gap > best || (r > 0 && gap >= reach)) break;
@@ -318,25 +344,17 @@ class PointMap {
     return false;
   }
 
-  template <typename Visit>
-  void for_each_near(double x, double y, double reach, Visit&& visit) const {
-    const int64_t i0 = std::max(index(x - reach), left_), i1 = std::min(index(x + reach), left_ + columns_ - 1);
-    const int64_t j0 = std::max(index(y - reach), low_), j1 = std::min(index(y + reach), low_ + rows_ - 1);
-    for (int64_t i = i0; i <= i1; ++i)
-      for (int64_t j = j0; j <= j1; ++j)
-        for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)]) visit(q);
-  }
-
   Fit align_one(const double* points, const double* normals, size_t n, const double* start, const double* prior,
                 const Settings& p, const int64_t* tags, const In<bool, 2>* corresponding) const {
     Fit fit{start[0], start[1], start[2], {}};
     std::array<double, 9> held;  // [1/m², 1/rad²], so that a start without pairs stays
     for (int e = 0; e < 9; ++e) held[e] = prior[e] + (e % 4 == 0 ? 1e-6 : 0.0);
+    std::vector<const Point*> partner(n, nullptr);  // of the iteration before: a good guess
     double scale = p.start_scale;
     const double per_noise = 1 / (p.noise * p.noise);
     for (int iteration = 0; iteration < p.max_iterations; ++iteration) {
       std::array<double, 3> gradient{};
-      linearise(points, normals, n, fit, scale, tags, corresponding, gradient);
+      linearise(points, normals, n, fit, scale, tags, corresponding, partner, gradient);
       const std::array<double, 3> error{fit.x - start[0], fit.y - start[1], wrap(fit.turn - start[2])};
       std::array<double, 9> system;
       std::array<double, 3> force;
@@ -357,7 +375,8 @@ class PointMap {
 
   // Normal matrix and gradient of the robust point-to-line cost (Geman-McClure) at a pose.
   void linearise(const double* points, const double* normals, size_t n, Fit& fit, double scale,
-                 const int64_t* tags, const In<bool, 2>* corresponding, std::array<double, 3>& gradient) const {
+                 const int64_t* tags, const In<bool, 2>* corresponding, std::vector<const Point*>& partner,
+                 std::array<double, 3>& gradient) const {
     const double c = std::cos(fit.turn), s = std::sin(fit.turn);
     double xx = 0, xy = 0, xt = 0, yy = 0, yt = 0, tt = 0, gx = 0, gy = 0, gt = 0;
     for (size_t i = 0; i < n; ++i) {
@@ -366,7 +385,8 @@ class PointMap {
       const double ax = c * p[0] - s * p[1], ay = s * p[0] + c * p[1];
       const double x = fit.x + ax, y = fit.y + ay;
       const double u = weight_ * (c * m[0] - s * m[1]), v = weight_ * (s * m[0] + c * m[1]);
-      const Point* q = nearest(x, y, u, v, 3 * scale);
+      const Point* q = nearest(x, y, u, v, 3 * scale, partner[i]);
+      partner[i] = q ? q : partner[i];
       if (!q) continue;
       if (corresponding) {
         if (q->tag < 0 || tags[i] < 0) continue;
@@ -387,6 +407,7 @@ class PointMap {
     gradient = {gx, gy, gt};
   }
 
+  static constexpr int64_t kMargin = 16;  // cells around what is there
   static constexpr int64_t kMaxCells = int64_t{1} << 26;
 };
 
@@ -415,6 +436,7 @@ inline void bind_point_map(nb::module_& m) {
            nb::arg("settings"), nb::arg("tags") = nb::none(), nb::arg("corresponding") = nb::none())
       .def("content", &PointMap::content)
       .def("seen_through", &PointMap::seen_through, nb::arg("clear"), nb::arg("first"), nb::arg("spacing"),
-           nb::arg("poses"), nb::arg("clearance"), nb::arg("sight"), nb::arg("far_sight"), nb::arg("facing"))
+           nb::arg("poses"), nb::arg("clearance"), nb::arg("sight"), nb::arg("far_sight"), nb::arg("facing"),
+           nb::arg("every") = 1)
       .def("copy", &PointMap::copy);
 }

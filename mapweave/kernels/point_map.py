@@ -81,6 +81,7 @@ class PointMap(Protocol):
         sight: float,
         far_sight: float,
         facing: float,
+        every: int = 1,
     ) -> Floats:
         """Return (k,) the share of the points in sight that a scan at each pose saw through.
 
@@ -96,6 +97,8 @@ class PointMap(Protocol):
             [m] up to which points are in sight.
         far_sight, facing
             [m] the same for points whose normal is turned towards the sensor, by this cosine.
+        every
+            Only points whose number is a multiple of it count.
         """
 
     def copy(self) -> "PointMap":
@@ -195,13 +198,15 @@ class NumpyPointMap:
         sight: float,
         far_sight: float,
         facing: float,
+        every: int = 1,
     ) -> Floats:
         """See `PointMap`."""
         shares = np.zeros(len(_poses(poses)))
+        counted = self._number % every == 0
         for k, pose in enumerate(poses):
-            offset = self._points - pose[:2]
+            offset = self._points[counted] - pose[:2]
             squared = (offset**2).sum(axis=1)
-            ahead = -(offset * self._normals).sum(axis=1)
+            ahead = -(offset * self._normals[counted]).sum(axis=1)
             faced = (ahead > 0) & (ahead**2 > facing**2 * squared) & (squared < far_sight**2)
             seen = (squared < sight**2) | faced
             if seen.any():

@@ -35,6 +35,9 @@ class LocalMapParameters(BaseModel):
         ge=0,
         description="[m] within which a point is one that was seen before: a laser's noise",
     )
+    sample: int = Field(
+        3, ge=1, description="one in so many known points tells what was seen through"
+    )
     witnesses: int = Field(12, ge=1, description="nearest keyframes asked what they saw through")
     overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
     clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
@@ -167,6 +170,7 @@ class LocalMap:
             p.sight,
             p.far_sight,
             p.facing,
+            p.sample,
         )
         shares = zip(explained.mean(axis=1), contradicted.mean(axis=1), through, strict=True)
         return [ScanEvidence(float(e), float(c), float(t)) for e, c, t in shares]

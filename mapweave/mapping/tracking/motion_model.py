@@ -6,8 +6,10 @@ the way that went with turns like it. How well a robot keeps to that is its own:
 the steps that what was seen determines; those along bare walls say what was expected of them.
 """
 
+import math
 from collections import deque
-from dataclasses import dataclass
+from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -42,22 +44,26 @@ class MotionModelParameters(BaseModel):
     turn_surprise: float = Field(0.03, ge=0, description="the same for the turn")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Expected:
-    """A step (3,) [m, m, rad] that would surprise least, and the sigma [m] of its way."""
+class _Expected(NamedTuple):
+    """A step that would surprise least [m, m, rad], and the sigma [m] of its way."""
 
-    step: FloatArray
+    x: float
+    y: float
+    turn: float
     sigma: float
 
 
 class MotionModel:
-    """Expects the next step from those before it."""
+    """Expects the next step from those before it.
+
+    It is asked several times a scan about a handful of numbers: plain floats, no arrays.
+    """
 
     def __init__(self, parameters: MotionModelParameters) -> None:
         self._p = parameters
-        self._steps: deque[FloatArray] = deque(maxlen=parameters.known)
+        self._steps: deque[tuple[float, float, float]] = deque(maxlen=parameters.known)
         self._off: deque[float] = deque(maxlen=parameters.known)
-        self._last: FloatArray = se2.IDENTITY
+        self._last = (0.0, 0.0, 0.0)
 
     def copy(self) -> "MotionModel":
         """Return one that goes on by itself from here."""
@@ -75,80 +81,85 @@ class MotionModel:
         told
             (3,) by odometry, if there is any.
         """
-        return np.array([e.step for e in self._expected(float(self._last[2]), missed, told)])
+        return np.array([e[:3] for e in self._expected(self._last[2], missed, told)])
 
     def surprise(self, step: FloatArray, missed: int = 0, told: FloatArray | None = None) -> float:
         """Return how unlikely a `step` (3,) is, as a share of returns it is worth less.
 
         Of all that is likely the nearest counts.
         """
-        return min(
-            self._off_by(step, e.step, e.sigma)
-            for e in self._expected(float(step[2]), missed, told)
-        )
+        x, y, turn = step.tolist()
+        return min(self._off_by(x, y, turn, e, e.sigma) for e in self._expected(turn, missed, told))
 
     def leap(self, step: FloatArray, missed: int = 0, told: FloatArray | None = None) -> float:
         """Return the surprise of a `step` for a robot that does not keep to its pace."""
-        return min(
-            self._off_by(step, e.step, self._p.max_sigma)
-            for e in self._expected(float(step[2]), missed, told)
-        )
+        x, y, turn = step.tolist()
+        sigma = self._p.max_sigma
+        return min(self._off_by(x, y, turn, e, sigma) for e in self._expected(turn, missed, told))
 
-    def way(self, turn: float) -> tuple[FloatArray, float]:
-        """Return (2,) the way [m] that is expected with `turn` [rad], and its sigma [m]."""
+    def way(self, turn: float) -> tuple[float, float, float]:
+        """Return the way x, y [m] that is expected with `turn` [rad], and its sigma [m]."""
         p = self._p
         alike = self._alike(turn)
         if len(alike) < p.enough:
-            return self._last[:2], p.max_sigma
-        sigma = p.spread * float(np.median(self._off)) if len(self._off) > p.steps else p.max_sigma
-        return np.median(alike, axis=0), float(np.clip(sigma, p.min_sigma, p.max_sigma))
+            return self._last[0], self._last[1], p.max_sigma
+        sigma = p.spread * median(self._off) if len(self._off) > p.steps else p.max_sigma
+        x, y = median(x for x, _ in alike), median(y for _, y in alike)
+        return x, y, min(max(sigma, p.min_sigma), p.max_sigma)
 
     def reach(self, steps: int) -> float:
         """Return how far [m] a robot comes in so many steps, were each as long as its longest."""
         p = self._p
-        longest = max((float(np.hypot(*step[:2])) for step in self._steps), default=np.inf)
+        longest = max((math.hypot(x, y) for x, y, _ in self._steps), default=math.inf)
         return steps * p.faster * longest + p.max_sigma
 
     def add(self, step: FloatArray, information: FloatArray) -> None:
         """Take a step (3,), and the (3, 3) information that held it, in units of one point."""
+        x, y, turn = step.tolist()
         if np.linalg.eigvalsh(information[:2, :2])[0] >= self._p.held:
-            if len(self._alike(step[2])) >= self._p.enough:
-                self._off.append(float(np.hypot(*(step[:2] - self.way(step[2])[0]))))
-            self._steps.append(step)
-        self._last = step
+            if len(self._alike(turn)) >= self._p.enough:
+                usual_x, usual_y, _ = self.way(turn)
+                self._off.append(math.hypot(x - usual_x, y - usual_y))
+            self._steps.append((x, y, turn))
+        self._last = (x, y, turn)
 
-    def _alike(self, turn: float) -> list[FloatArray]:
-        """(k, 2) ways that went with turns alike, the latest; to the other side counts as well."""
+    def _alike(self, turn: float) -> list[tuple[float, float]]:
+        """Ways that went with turns alike, the latest; to the other side counts as well."""
         p = self._p
         apart = max(p.alike, p.alike_share * abs(turn))
-        found: list[FloatArray] = []
+        found: list[tuple[float, float]] = []
         for x, y, turned in reversed(self._steps):
             if len(found) == p.steps:
                 break
             if abs(turned - turn) <= apart:
-                found.append(np.array([x, y]))
+                found.append((x, y))
             elif abs(turned + turn) <= apart:
-                found.append(np.array([x, -y]))
+                found.append((x, -y))
         return found
 
     def _expected(self, turn: float, missed: int, told: FloatArray | None) -> list[_Expected]:
         """Return what is likely if the robot turns by `turn` [rad]."""
-        p, last = self._p, float(self._last[2])
+        p, last = self._p, self._last[2]
         if missed:  # it went on at its pace, or stopped, which is why scans were missed
-            straight = np.append(self.way(0.0)[0], 0.0)
-            gone = np.append(self.way(last)[0], last)
+            straight = np.array([*self.way(0.0)[:2], 0.0])
+            gone = np.array([*self.way(last)[:2], last])
             for _ in range(missed):
                 gone = se2.compose(gone, straight)
-            found = [_Expected(gone, p.max_sigma), _Expected(se2.IDENTITY, p.max_sigma)]
+            found = [_step(gone, p.max_sigma), _step(se2.IDENTITY, p.max_sigma)]
         else:
-            way, sigma = self.way(turn)
-            found = [_Expected(np.append(way, last), sigma)]
-        return found if told is None else [_Expected(told, p.max_sigma), *found]
+            x, y, sigma = self.way(turn)
+            found = [_Expected(x, y, last, sigma)]
+        return found if told is None else [_step(told, p.max_sigma), *found]
 
-    def _off_by(self, step: FloatArray, expected: FloatArray, sigma: float) -> float:
+    def _off_by(self, x: float, y: float, turn: float, expected: _Expected, sigma: float) -> float:
         """Heavy-tailed: robots do turn on the spot between two scans, only not often."""
         p = self._p
-        x, y, turn = step - expected
-        moved = p.surprise * np.log1p((x * x + y * y) / sigma**2)
-        turned = p.turn_surprise * np.log1p((float(se2.wrap(turn)) / p.turn_sigma) ** 2)
-        return float(moved + turned)
+        dx, dy = x - expected.x, y - expected.y
+        turned = math.remainder(turn - expected.turn, 2 * math.pi) / p.turn_sigma
+        moved = math.log1p((dx * dx + dy * dy) / sigma**2)
+        return p.surprise * moved + p.turn_surprise * math.log1p(turned * turned)
+
+
+def _step(step: FloatArray, sigma: float) -> _Expected:
+    x, y, turn = step.tolist()
+    return _Expected(x, y, turn, sigma)

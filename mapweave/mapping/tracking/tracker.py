@@ -245,7 +245,7 @@ class Tracker:
         if held[0] > p.open_direction * held[1]:
             return []
         along, across = directions[:, 0], directions[:, 1]
-        way, _ = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))
+        way = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))[:2]
         usual = se2.rotation(self.pose[2]) @ way @ along
         steps = np.append(np.arange(-p.open_reach, p.open_reach + 1e-9, p.open_step), usual)
         starts = np.tile(self.pose, (len(steps), 1))

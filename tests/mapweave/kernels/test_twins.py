@@ -51,7 +51,7 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
         compiled.explains(*asked, poses, 0.5), twin.explains(*asked, poses, 0.5)
     )
     beams = rng.uniform(0, 9, 50), -1.5, 0.06
-    sight = (0.3, 3.0, 6.0, 0.7)
+    sight = (0.3, 3.0, 6.0, 0.7, int(rng.integers(1, 4)))
     np.testing.assert_allclose(
         compiled.seen_through(*beams, poses, *sight), twin.seen_through(*beams, poses, *sight)
     )
