@@ -34,11 +34,24 @@ struct Known {
 struct Settings {
   double start_scale, end_scale, shrink, converged, noise;
   int max_iterations;
+  int trial;     // iterations after which poor starts are dropped
+  double share;  // of the best start's support that one must have by then
 };
 
 struct Fit {
   double x, y, turn;
   std::array<double, 9> information;
+  double support;  // summed weight of the pairs
+};
+
+// A start on its way.
+struct Attempt {
+  std::array<double, 3> start;
+  Fit fit;
+  double scale;
+  int iterations = 0;
+  bool settled = false;
+  std::vector<const Point*> partner;  // of the iteration before: a good guess
 };
 
 // Solves the symmetric positive definite 3 x 3 system by Cholesky's factors.
@@ -129,7 +142,8 @@ class PointMap {
     return Out<bool>(out, {k, n}, owner);
   }
 
-  // Poses (k, 3) where the points come to lie from each start, and what holds them (k, 3, 3).
+  // Which (k,) starts were not dropped, the poses (k, 3) where the points come to lie from them, and what
+  // holds them (k, 3, 3).
   nb::tuple align(In<double, 2> points, In<double, 2> normals, In<double, 2> starts, In<double, 2> prior,
                   const Settings& p, std::optional<In<int64_t, 1>> tags,
                   std::optional<In<bool, 2>> corresponding) const {
@@ -137,14 +151,35 @@ class PointMap {
     if (prior.shape(0) != 3 || prior.shape(1) != 3) throw std::invalid_argument("prior: (3, 3) expected");
     if (bool(tags) != bool(corresponding) || (tags && tags->shape(0) != n))
       throw std::invalid_argument("tags, one a point, and corresponding come together");
-    std::vector<double> poses(3 * k), information(9 * k);
+    std::vector<Attempt> attempts;
     for (size_t j = 0; j < k; ++j) {
-      const Fit fit = align_one(points.data(), normals.data(), n, starts.data() + 3 * j, prior.data(), p,
-                                tags ? tags->data() : nullptr, corresponding ? &*corresponding : nullptr);
-      poses[3 * j] = fit.x, poses[3 * j + 1] = fit.y, poses[3 * j + 2] = wrap(fit.turn);
-      std::copy(fit.information.begin(), fit.information.end(), information.begin() + 9 * j);
+      const double* from = starts.data() + 3 * j;
+      attempts.push_back({{from[0], from[1], from[2]}, {from[0], from[1], from[2], {}, 0}, p.start_scale});
+      attempts.back().partner.assign(n, nullptr);
     }
-    return nb::make_tuple(give(std::move(poses), {k, 3}), give(std::move(information), {k, 3, 3}));
+    const auto go_on = [&](Attempt& attempt, int until) {
+      while (!attempt.settled && attempt.iterations < until)
+        iterate(points.data(), normals.data(), n, attempt, prior.data(), p, tags ? tags->data() : nullptr,
+                corresponding ? &*corresponding : nullptr);
+    };
+    double most = 0;
+    for (Attempt& attempt : attempts) {
+      go_on(attempt, std::min(p.trial, p.max_iterations));
+      most = std::max(most, attempt.fit.support);
+    }
+    std::vector<int64_t> kept;
+    std::vector<double> poses, information;
+    for (size_t j = 0; j < k; ++j) {
+      if (attempts[j].fit.support < p.share * most) continue;
+      go_on(attempts[j], p.max_iterations);
+      const Fit& fit = attempts[j].fit;
+      kept.push_back(static_cast<int64_t>(j));
+      poses.insert(poses.end(), {fit.x, fit.y, wrap(fit.turn)});
+      information.insert(information.end(), fit.information.begin(), fit.information.end());
+    }
+    const size_t left = kept.size();
+    return nb::make_tuple(give(std::move(kept), {left}), give(std::move(poses), {left, 3}),
+                          give(std::move(information), {left, 3, 3}));
   }
 
   // (n, 2) points and (n, 2) normals that are there, in the order of adding.
@@ -344,41 +379,37 @@ class PointMap {
     return false;
   }
 
-  Fit align_one(const double* points, const double* normals, size_t n, const double* start, const double* prior,
-                const Settings& p, const int64_t* tags, const In<bool, 2>* corresponding) const {
-    Fit fit{start[0], start[1], start[2], {}};
-    std::array<double, 9> held;  // [1/m², 1/rad²], so that a start without pairs stays
-    for (int e = 0; e < 9; ++e) held[e] = prior[e] + (e % 4 == 0 ? 1e-6 : 0.0);
-    std::vector<const Point*> partner(n, nullptr);  // of the iteration before: a good guess
-    double scale = p.start_scale;
+  // One step of Gauss and Newton, held by the prior.
+  void iterate(const double* points, const double* normals, size_t n, Attempt& attempt, const double* prior,
+               const Settings& p, const int64_t* tags, const In<bool, 2>* corresponding) const {
+    Fit& fit = attempt.fit;
+    std::array<double, 3> gradient{};
+    linearise(points, normals, n, attempt, tags, corresponding, gradient);
+    const std::array<double, 3> error{fit.x - attempt.start[0], fit.y - attempt.start[1],
+                                      wrap(fit.turn - attempt.start[2])};
     const double per_noise = 1 / (p.noise * p.noise);
-    for (int iteration = 0; iteration < p.max_iterations; ++iteration) {
-      std::array<double, 3> gradient{};
-      linearise(points, normals, n, fit, scale, tags, corresponding, partner, gradient);
-      const std::array<double, 3> error{fit.x - start[0], fit.y - start[1], wrap(fit.turn - start[2])};
-      std::array<double, 9> system;
-      std::array<double, 3> force;
-      for (int e = 0; e < 9; ++e) system[e] = fit.information[e] * per_noise + held[e];
-      for (int a = 0; a < 3; ++a)
-        force[a] = gradient[a] * per_noise +
-                   (error[0] * held[a] + error[1] * held[3 + a] + error[2] * held[6 + a]);
-      const std::array<double, 3> step = solve(system, force);
-      fit.x -= step[0], fit.y -= step[1], fit.turn -= step[2];
-      if (scale <= p.end_scale) {
-        const double largest = std::max(std::abs(step[0]), std::max(std::abs(step[1]), std::abs(step[2])));
-        if (largest < p.converged) break;
-      }
-      scale = std::max(p.end_scale, scale * p.shrink);
-    }
-    return fit;
+    std::array<double, 9> system, held;
+    std::array<double, 3> force;
+    for (int e = 0; e < 9; ++e) held[e] = prior[e] + (e % 4 == 0 ? kWeakest : 0.0);
+    for (int e = 0; e < 9; ++e) system[e] = fit.information[e] * per_noise + held[e];
+    for (int a = 0; a < 3; ++a)
+      force[a] = gradient[a] * per_noise + (error[0] * held[a] + error[1] * held[3 + a] + error[2] * held[6 + a]);
+    const std::array<double, 3> step = solve(system, force);
+    fit.x -= step[0], fit.y -= step[1], fit.turn -= step[2];
+    const double largest = std::max(std::abs(step[0]), std::max(std::abs(step[1]), std::abs(step[2])));
+    attempt.settled = attempt.scale <= p.end_scale && largest < p.converged;
+    attempt.scale = std::max(p.end_scale, attempt.scale * p.shrink);
+    ++attempt.iterations;
   }
 
   // Normal matrix and gradient of the robust point-to-line cost (Geman-McClure) at a pose.
-  void linearise(const double* points, const double* normals, size_t n, Fit& fit, double scale,
-                 const int64_t* tags, const In<bool, 2>* corresponding, std::vector<const Point*>& partner,
-                 std::array<double, 3>& gradient) const {
+  void linearise(const double* points, const double* normals, size_t n, Attempt& attempt, const int64_t* tags,
+                 const In<bool, 2>* corresponding, std::array<double, 3>& gradient) const {
+    Fit& fit = attempt.fit;
+    const double scale = attempt.scale;
+    std::vector<const Point*>& partner = attempt.partner;
     const double c = std::cos(fit.turn), s = std::sin(fit.turn);
-    double xx = 0, xy = 0, xt = 0, yy = 0, yt = 0, tt = 0, gx = 0, gy = 0, gt = 0;
+    double xx = 0, xy = 0, xt = 0, yy = 0, yt = 0, tt = 0, gx = 0, gy = 0, gt = 0, support = 0;
     for (size_t i = 0; i < n; ++i) {
       const double* p = points + 2 * i;
       const double* m = normals + 2 * i;
@@ -397,6 +428,7 @@ class PointMap {
       }
       const double pull = 1 + squared(*q, x, y, u, v) / (scale * scale);
       const double w = 1 / (pull * pull);
+      support += w;
       const double residual = q->nx * (x - q->x) + q->ny * (y - q->y);
       const double turning = q->ny * ax - q->nx * ay;
       xx += w * q->nx * q->nx, xy += w * q->nx * q->ny, xt += w * q->nx * turning;
@@ -404,9 +436,11 @@ class PointMap {
       gx += w * q->nx * residual, gy += w * q->ny * residual, gt += w * turning * residual;
     }
     fit.information = {xx, xy, xt, xy, yy, yt, xt, yt, tt};
+    fit.support = support;
     gradient = {gx, gy, gt};
   }
 
+  static constexpr double kWeakest = 1e-6;  // [1/m², 1/rad²] so that a start without pairs stays
   static constexpr int64_t kMargin = 16;  // cells around what is there
   static constexpr int64_t kMaxCells = int64_t{1} << 26;
 };
@@ -419,11 +453,11 @@ inline void bind_point_map(nb::module_& m) {
   nb::class_<Settings>(m, "IcpSettings")
       .def("__init__",
            [](Settings* self, double start_scale, double end_scale, double shrink, double converged, double noise,
-              int max_iterations) {
-             new (self) Settings{start_scale, end_scale, shrink, converged, noise, max_iterations};
+              int max_iterations, int trial, double share) {
+             new (self) Settings{start_scale, end_scale, shrink, converged, noise, max_iterations, trial, share};
            },
            nb::arg("start_scale"), nb::arg("end_scale"), nb::arg("shrink"), nb::arg("converged"),
-           nb::arg("noise"), nb::arg("max_iterations"));
+           nb::arg("noise"), nb::arg("max_iterations"), nb::arg("trial"), nb::arg("share"));
   nb::class_<PointMap>(m, "PointMap")
       .def(nb::init<double, double, double, int64_t>(), nb::arg("normal_weight"), nb::arg("cell"),
            nb::arg("thin"), nb::arg("blocks"))

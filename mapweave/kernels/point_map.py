@@ -21,7 +21,11 @@ _WEAKEST = np.diag([1e-6, 1e-6, 1e-6])  # [1/m², 1/rad²] so that a start witho
 
 
 class IcpSettings(NamedTuple):
-    """How ICP goes on: scales [m], `converged` the smallest step worth another [m, rad]."""
+    """How ICP goes on: scales [m], `converged` the smallest step worth another [m, rad].
+
+    After `trial` iterations starts with less than `share` of the best one's support, the summed
+    weight of its pairs, are dropped.
+    """
 
     start_scale: float
     end_scale: float
@@ -29,6 +33,8 @@ class IcpSettings(NamedTuple):
     converged: float
     noise: float
     max_iterations: int
+    trial: int
+    share: float
 
 
 class PointMap(Protocol):
@@ -62,8 +68,10 @@ class PointMap(Protocol):
         settings: IcpSettings,
         tags: Ints | None = None,
         corresponding: Bools | None = None,
-    ) -> tuple[Floats, Floats]:
-        """Return (k, 3) poses where the points come to lie, and what holds them (k, 3, 3).
+    ) -> tuple[Ints, Floats, Floats]:
+        """Return which (k,) starts were kept, where the points come to lie, what holds them.
+
+        Poses (k, 3) and (k, 3, 3) information.
 
         See `mapweave.matching.icp.align_all`.
         """
@@ -173,16 +181,22 @@ class NumpyPointMap:
         settings: IcpSettings,
         tags: Ints | None = None,
         corresponding: Bools | None = None,
-    ) -> tuple[Floats, Floats]:
+    ) -> tuple[Ints, Floats, Floats]:
         """See `PointMap`."""
         _check(points, normals)
-        poses = np.array(_poses(starts), dtype=np.float64)
-        information = np.zeros((len(poses), 3, 3))
-        for k in range(len(poses)):
-            poses[k], information[k] = self._align_one(
-                points, normals, starts[k], prior + _WEAKEST, settings, tags, corresponding
-            )
-        return poses, information
+        held, p = prior + _WEAKEST, settings
+        pull = (points, normals, tags, corresponding)
+        attempts = [_Attempt(start, p.start_scale) for start in _poses(starts)]
+        for attempt in attempts:
+            self._go_on(attempt, min(p.trial, p.max_iterations), held, p, *pull)
+        most = max((attempt.support for attempt in attempts), default=0.0)
+        kept = [k for k, attempt in enumerate(attempts) if attempt.support >= p.share * most]
+        for k in kept:
+            self._go_on(attempts[k], p.max_iterations, held, p, *pull)
+            attempts[k].pose[2] = _wrap(attempts[k].pose[2])
+        poses = np.array([attempts[k].pose for k in kept]).reshape(-1, 3)
+        information = np.array([attempts[k].information for k in kept]).reshape(-1, 3, 3)
+        return np.array(kept, dtype=np.int64), poses, information
 
     def content(self) -> tuple[Floats, Floats]:
         """See `PointMap`."""
@@ -231,31 +245,31 @@ class NumpyPointMap:
         distance, index = self._tree.query(asked, distance_upper_bound=reach)
         return np.asarray(distance, dtype=np.float64), np.asarray(index, dtype=np.int64)
 
-    def _align_one(
+    def _go_on(
         self,
-        points: Floats,
-        normals: Floats,
-        start: Floats,
+        attempt: "_Attempt",
+        until: int,
         held: Floats,
         p: IcpSettings,
+        points: Floats,
+        normals: Floats,
         tags: Ints | None,
         corresponding: Bools | None,
-    ) -> tuple[Floats, Floats]:
-        pose, scale = np.array(start, dtype=np.float64), p.start_scale
-        information = np.zeros((3, 3))
-        for _ in range(p.max_iterations):
-            information, gradient = self._linearise(
-                points, normals, pose, scale, tags, corresponding
+    ) -> None:
+        """Iterate Gauss and Newton's steps, held by the prior, until none is worth it."""
+        while not attempt.settled and attempt.iterations < until:
+            pose, start = attempt.pose, attempt.start
+            attempt.information, gradient, attempt.support = self._linearise(
+                points, normals, pose, attempt.scale, tags, corresponding
             )
             error = np.append(pose[:2] - start[:2], _wrap(pose[2] - start[2]))
-            system = information / p.noise**2 + held
+            system = attempt.information / p.noise**2 + held
             step = np.linalg.solve(system, gradient / p.noise**2 + error @ held)
-            pose = pose - step
-            if scale <= p.end_scale and np.abs(step).max() < p.converged:
-                break
-            scale = max(p.end_scale, scale * p.shrink)
-        pose[2] = _wrap(pose[2])
-        return pose, information
+            attempt.pose = pose - step
+            small = np.abs(step).max() < p.converged
+            attempt.settled = bool(attempt.scale <= p.end_scale and small)
+            attempt.scale = max(p.end_scale, attempt.scale * p.shrink)
+            attempt.iterations += 1
 
     def _linearise(
         self,
@@ -265,8 +279,8 @@ class NumpyPointMap:
         scale: float,
         tags: Ints | None,
         corresponding: Bools | None,
-    ) -> tuple[Floats, Floats]:
-        """(3, 3) normal matrix and (3,) gradient of the robust point-to-line cost at a pose."""
+    ) -> tuple[Floats, Floats, float]:
+        """(3, 3) normal matrix, (3,) gradient of the robust point-to-line cost, summed weight."""
         placed, turned = _placed(points, normals, pose)
         distance, index = self._nearest(placed, turned, 3 * scale)
         paired = np.isfinite(distance)
@@ -281,7 +295,18 @@ class NumpyPointMap:
         arm = placed[paired] - pose[:2]
         turning = there[:, 1] * arm[:, 0] - there[:, 0] * arm[:, 1]
         jacobian = np.column_stack([there, turning])
-        return (weight[:, None] * jacobian).T @ jacobian, jacobian.T @ (weight * residual)
+        normal_matrix = (weight[:, None] * jacobian).T @ jacobian
+        return normal_matrix, jacobian.T @ (weight * residual), float(weight.sum())
+
+
+class _Attempt:
+    """A start on its way."""
+
+    def __init__(self, start: Floats, scale: float) -> None:
+        self.start, self.scale = start, scale
+        self.pose = np.array(start, dtype=np.float64)
+        self.information: Floats = np.zeros((3, 3))
+        self.support, self.iterations, self.settled = 0.0, 0, False
 
 
 def before_beams(

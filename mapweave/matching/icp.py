@@ -40,6 +40,7 @@ class IcpParameters(BaseModel):
     converged: float = Field(
         2e-4, gt=0, description="[m, rad] smallest step worth another iteration"
     )
+    trial: int = Field(5, ge=0, description="iterations after which poor starts may be dropped")
     noise: float = Field(
         0.1,
         gt=0,
@@ -98,8 +99,11 @@ def align_all(
     parameters: IcpParameters,
     prior: FloatArray | None = None,
     corresponding: BoolArray | None = None,
+    share: float = 0.0,
 ) -> list[Fit]:
     """Move `moving` from each of `starts` (k, 3) until it lies on `target`.
+
+    Starts that after some iterations have less than `share` of the best one's support are dropped.
 
     Parameters
     ----------
@@ -120,9 +124,11 @@ def align_all(
             parameters.converged,
             parameters.noise,
             parameters.max_iterations,
+            parameters.trial,
+            share,
         )
     )
-    poses, information = target.known.align(
+    _, poses, information = target.known.align(
         moving.points,
         moving.normals,
         np.ascontiguousarray(starts, dtype=np.float64),

@@ -12,7 +12,8 @@ def clear_ranges(scan: Scan, max_range: float) -> FloatArray:
     The neighbours count because space between two beams is only known to be free as far as both
     reach. A beam that did not come back proves nothing (glass, black cloth): 0.
     """
-    reach = np.minimum(np.nan_to_num(scan.ranges, nan=0.0), max_range)
+    reach = np.minimum(scan.ranges, max_range)
+    reach[np.isnan(reach)] = 0.0
     padded = np.concatenate([reach[:1], reach, reach[-1:]])
     clear: FloatArray = np.minimum(np.minimum(padded[:-2], padded[1:-1]), padded[2:])
     return clear

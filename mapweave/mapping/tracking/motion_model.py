@@ -63,12 +63,14 @@ class MotionModel:
         self._p = parameters
         self._steps: deque[tuple[float, float, float]] = deque(maxlen=parameters.known)
         self._off: deque[float] = deque(maxlen=parameters.known)
+        self._sigma = parameters.max_sigma  # [m] of a step with a turn that is known
         self._last = (0.0, 0.0, 0.0)
 
     def copy(self) -> "MotionModel":
         """Return one that goes on by itself from here."""
         other = MotionModel(self._p)
-        other._steps, other._off, other._last = self._steps.copy(), self._off.copy(), self._last
+        other._steps, other._off = self._steps.copy(), self._off.copy()
+        other._sigma, other._last = self._sigma, self._last
         return other
 
     def guesses(self, missed: int = 0, told: FloatArray | None = None) -> FloatArray:
@@ -83,19 +85,27 @@ class MotionModel:
         """
         return np.array([e[:3] for e in self._expected(self._last[2], missed, told)])
 
-    def surprise(self, step: FloatArray, missed: int = 0, told: FloatArray | None = None) -> float:
-        """Return how unlikely a `step` (3,) is, as a share of returns it is worth less.
+    def judge(
+        self, step: FloatArray, missed: int = 0, told: FloatArray | None = None
+    ) -> tuple[float, float]:
+        """Return how unlikely a `step` (3,) is for this robot, and for any: surprise and leap.
 
-        Of all that is likely the nearest counts.
+        Both are shares of returns that it is worth less. Of all that is likely the nearest counts.
+        A leap is the surprise for a robot that does not keep to its pace.
         """
         x, y, turn = step.tolist()
-        return min(self._off_by(x, y, turn, e, e.sigma) for e in self._expected(turn, missed, told))
+        expected = self._expected(turn, missed, told)
+        surprise = min(self._off_by(x, y, turn, e, e.sigma) for e in expected)
+        leap = min(self._off_by(x, y, turn, e, self._p.max_sigma) for e in expected)
+        return surprise, leap
+
+    def surprise(self, step: FloatArray, missed: int = 0, told: FloatArray | None = None) -> float:
+        """Return how unlikely a `step` (3,) is for this robot; see `judge`."""
+        return self.judge(step, missed, told)[0]
 
     def leap(self, step: FloatArray, missed: int = 0, told: FloatArray | None = None) -> float:
-        """Return the surprise of a `step` for a robot that does not keep to its pace."""
-        x, y, turn = step.tolist()
-        sigma = self._p.max_sigma
-        return min(self._off_by(x, y, turn, e, sigma) for e in self._expected(turn, missed, told))
+        """Return how unlikely a `step` (3,) is for any robot; see `judge`."""
+        return self.judge(step, missed, told)[1]
 
     def way(self, turn: float) -> tuple[float, float, float]:
         """Return the way x, y [m] that is expected with `turn` [rad], and its sigma [m]."""
@@ -103,9 +113,7 @@ class MotionModel:
         alike = self._alike(turn)
         if len(alike) < p.enough:
             return self._last[0], self._last[1], p.max_sigma
-        sigma = p.spread * median(self._off) if len(self._off) > p.steps else p.max_sigma
-        x, y = median(x for x, _ in alike), median(y for _, y in alike)
-        return x, y, min(max(sigma, p.min_sigma), p.max_sigma)
+        return median(x for x, _ in alike), median(y for _, y in alike), self._sigma
 
     def reach(self, steps: int) -> float:
         """Return how far [m] a robot comes in so many steps, were each as long as its longest."""
@@ -120,6 +128,9 @@ class MotionModel:
             if len(self._alike(turn)) >= self._p.enough:
                 usual_x, usual_y, _ = self.way(turn)
                 self._off.append(math.hypot(x - usual_x, y - usual_y))
+                if len(self._off) > self._p.steps:
+                    sigma = self._p.spread * median(self._off)
+                    self._sigma = min(max(sigma, self._p.min_sigma), self._p.max_sigma)
             self._steps.append((x, y, turn))
         self._last = (x, y, turn)
 

@@ -47,6 +47,9 @@ class TrackerParameters(BaseModel):
     line_spacing: float = Field(0.1, gt=0, description="[m] between points on the map's lines")
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
     max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
+    promising: float = Field(
+        0.6, ge=0, le=1, description="of the best start's support that another must have early"
+    )
     prior_sigma: float = Field(0.5, gt=0, description="[m] of a prediction, in the alignment")
     prior_turn: float = Field(0.35, gt=0, description="[rad] the same for the turn")
     open_novelty: float = Field(
@@ -188,7 +191,8 @@ class Tracker:
         predicted = self._predictions(seen.scan)
         points = seen.oriented.points
         stages: list[tuple[float, Callable[[], FloatArray]]] = [
-            (a.convincing, lambda: np.vstack([predicted, self.pose])),
+            (a.convincing, lambda: predicted),
+            (a.convincing, lambda: self.pose[None]),
             (a.convincing, lambda: self._shape_starts(seen, known())),
             (a.convincing, lambda: self._local.search(points, predicted[0], p.first_window)),
             (a.acceptable, lambda: self._local.search(points, predicted[0], np.pi)),
@@ -278,19 +282,16 @@ class Tracker:
         stride = 1 + (len(oriented) - 1) // p.max_points
         prior = np.diag([p.prior_sigma**-2, p.prior_sigma**-2, p.prior_turn**-2])
         thinned = oriented.at(slice(None, None, stride))
-        fits = align_all(thinned, self._local.target, starts, p.local_map.icp, prior)
+        fits = align_all(
+            thinned, self._local.target, starts, p.local_map.icp, prior, share=p.promising
+        )
         poses = np.array([fit.pose for fit in fits])
         judged = self._local.evidence(seen.scan, oriented, poses)
         since = len(self.missed), self._told(seen.scan)
+        steps = se2.between(self.pose, poses)
         return [
-            ScanMatch(
-                fit.pose,
-                evidence,
-                fit.information,
-                self._motion.surprise(step, *since),
-                self._motion.leap(step, *since),
-            )
-            for fit, evidence, step in zip(fits, judged, se2.between(self.pose, poses), strict=True)
+            ScanMatch(fit.pose, evidence, fit.information, *self._motion.judge(step, *since))
+            for fit, evidence, step in zip(fits, judged, steps, strict=True)
         ]
 
 
