@@ -3,11 +3,13 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
 
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
 #include <stdexcept>
+#include <tuple>
 #include <vector>
 
 namespace nb = nanobind;

@@ -107,7 +107,7 @@ class PointMap {
   }
 
   // (n,) distance to the nearest point, place and normal at once, and its number.
-  nb::tuple find(In<double, 2> points, In<double, 2> normals, double reach) const {
+  std::tuple<Out<double>, Out<int64_t>> find(In<double, 2> points, In<double, 2> normals, double reach) const {
     const size_t n = check(points, normals);
     std::vector<double> distance(n, std::numeric_limits<double>::infinity());
     std::vector<int64_t> number(n, -1);
@@ -119,7 +119,7 @@ class PointMap {
       distance[i] = std::sqrt(squared(*found, p[0], p[1], weight_ * m[0], weight_ * m[1]));
       number[i] = found->number;
     }
-    return nb::make_tuple(give(std::move(distance), {n}), give(std::move(number), {n}));
+    return std::make_tuple(give(std::move(distance), {n}), give(std::move(number), {n}));
   }
 
   // (k, n) which points have a partner within reach, at each pose.
@@ -144,7 +144,7 @@ class PointMap {
 
   // Which (k,) starts were not dropped, the poses (k, 3) where the points come to lie from them, and what
   // holds them (k, 3, 3).
-  nb::tuple align(In<double, 2> points, In<double, 2> normals, In<double, 2> starts, In<double, 2> prior,
+  std::tuple<Out<int64_t>, Out<double>, Out<double>> align(In<double, 2> points, In<double, 2> normals, In<double, 2> starts, In<double, 2> prior,
                   const Settings& p, std::optional<In<int64_t, 1>> tags,
                   std::optional<In<bool, 2>> corresponding) const {
     const size_t n = check(points, normals), k = check_poses(starts);
@@ -178,12 +178,12 @@ class PointMap {
       information.insert(information.end(), fit.information.begin(), fit.information.end());
     }
     const size_t left = kept.size();
-    return nb::make_tuple(give(std::move(kept), {left}), give(std::move(poses), {left, 3}),
+    return std::make_tuple(give(std::move(kept), {left}), give(std::move(poses), {left, 3}),
                           give(std::move(information), {left, 3, 3}));
   }
 
   // (n, 2) points and (n, 2) normals that are there, in the order of adding.
-  nb::tuple content() const {
+  std::tuple<Out<double>, Out<double>> content() const {
     std::vector<double> points, normals;
     for (const Known& q : known_) {
       if (q.seen < 0) continue;
@@ -191,7 +191,7 @@ class PointMap {
       normals.insert(normals.end(), {q.nx, q.ny});
     }
     const size_t n = points.size() / 2;
-    return nb::make_tuple(give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}));
+    return std::make_tuple(give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}));
   }
 
   // (k,) of the points in sight from each pose, the share that lie before what the beams hit.

@@ -140,13 +140,15 @@ class Returns {
 };
 
 // ((n, 4) segments, (beams,) label): see segmentation.py.
-inline nb::tuple extract_segments(In<double, 1> angles, In<double, 1> ranges, const Settings& p) {
+inline std::tuple<Out<double>, Out<int64_t>> extract_segments(In<double, 1> angles, In<double, 1> ranges, const Settings& p) {
   std::vector<double> found;
   std::vector<int64_t> label(angles.shape(0), -1);
   Returns(angles, ranges, p).segments(found, label);
   const size_t n = found.size() / 4, beams = label.size();
-  return nb::make_tuple(give(std::move(found), {n, 4}), give(std::move(label), {beams}));
+  return std::make_tuple(give(std::move(found), {n, 4}), give(std::move(label), {beams}));
 }
+
+using OrientedPoints = std::tuple<Out<double>, Out<double>, Out<int64_t>>;
 
 struct Oriented {
   std::vector<double> points, normals;
@@ -159,15 +161,15 @@ struct Oriented {
     segment.push_back(on);
   }
 
-  nb::tuple give_away() {
+  OrientedPoints give_away() {
     const size_t n = segment.size();
-    return nb::make_tuple(give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}),
+    return std::make_tuple(give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}),
                           give(std::move(segment), {n}));
   }
 };
 
 // Oriented points of the returns, and between them on each segment: see segmentation.py.
-inline nb::tuple orient(In<double, 1> angles, In<double, 1> ranges, In<double, 2> segments, In<int64_t, 1> label,
+inline std::tuple<OrientedPoints, OrientedPoints> orient(In<double, 1> angles, In<double, 1> ranges, In<double, 2> segments, In<int64_t, 1> label,
                         double max_range, double max_gap, double spacing) {
   const size_t beams = angles.shape(0);
   const int64_t count = static_cast<int64_t>(segments.shape(0));
@@ -220,7 +222,7 @@ inline nb::tuple orient(In<double, 1> angles, In<double, 1> ranges, In<double, 2
       between.add(x[a] + share * dx, y[a] + share * dy, direction.first, direction.second, on[a]);
     }
   }
-  return nb::make_tuple(returns.give_away(), between.give_away());
+  return std::make_tuple(returns.give_away(), between.give_away());
 }
 
 }  // namespace segmentation
