@@ -18,7 +18,7 @@ from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.kernels.point_map import IcpSettings, PointMap, icp_settings, make_point_map
 from mapweave.scan.points import OrientedPoints
 
-CELL = 0.25  # [m] of the grid that partners are looked up in
+CELL = 0.2  # [m] of the grid that partners are looked up in
 
 
 class IcpParameters(BaseModel):

@@ -31,7 +31,7 @@ class LocalMapParameters(BaseModel):
     keyframe_step: float = Field(0.3, gt=0, description="[m] of motion that makes a new one")
     keyframe_turn: float = Field(0.26, gt=0, description="[rad] of rotation that makes one: 15°")
     thin: float = Field(
-        0.03,
+        0.02,
         ge=0,
         description="[m] within which a point is one that was seen before: a laser's noise",
     )
