@@ -33,6 +33,7 @@ from mapweave.scan.scan import Scan
 from mapweave.shape.correspondence import CorrespondenceParameters, correspond
 
 Found = list[tuple[Observation, ScanMatch]]
+EQUAL = 1e-3  # share of the returns by which worth must differ to matter
 
 
 class TrackerParameters(BaseModel):
@@ -215,8 +216,13 @@ class Tracker:
         return tell_apart(found, novelty, self.parameters.acceptance) if self.missed else found
 
     def _best(self, found: list[ScanMatch], novelty: float) -> ScanMatch | None:
-        """The one worth most of those that count; None where none does."""
-        return max(self._likely(found, novelty), key=lambda t: t.value(novelty), default=None)
+        """The one worth most of those that count, the first of equals; None where none does.
+
+        Many starts end within a millimetre of each other: rounding must not choose among them.
+        """
+        likely = [(t.value(novelty), t) for t in self._likely(found, novelty)]
+        most = max((value for value, _ in likely), default=0.0)
+        return next((t for value, t in likely if value >= most - EQUAL), None)
 
     def _predictions(self, scan: Scan) -> FloatArray:
         """(k, 3) where the robot may be by now."""
