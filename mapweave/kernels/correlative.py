@@ -3,8 +3,8 @@
 from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.point_map import Floats
@@ -22,7 +22,7 @@ def nearness_field_numpy(
     empty[index[:, 0], index[:, 1]] = False
     value = np.zeros(empty.shape, dtype=np.float32)
     if len(index):
-        squared = np.rint(distance_transform_edt(empty) ** 2) * cell**2
+        squared = np.rint(scipy.ndimage.distance_transform_edt(empty) ** 2) * cell**2
         near = np.exp(-squared / (2 * sigma**2)).astype(np.float32)
         value[:size, :size] = np.where(squared <= 16 * sigma**2, near, 0)[:size, :size]
     return value

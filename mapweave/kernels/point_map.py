@@ -8,8 +8,8 @@ sixty walls; what the last blocks did not see is forgotten.
 from typing import NamedTuple, Protocol, cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from mapweave.kernels.loading import COMPILED
 
@@ -125,7 +125,7 @@ class NumpyPointMap:
         self._normals: Floats = np.empty((0, 2))
         self._number = self._seen = self._tag = np.empty(0, dtype=np.int64)
         self._block = self._next = 0
-        self._tree: KDTree | None = None
+        self._tree: scipy.spatial.KDTree | None = None
 
     def __len__(self) -> int:
         """See `PointMap`."""
@@ -240,7 +240,9 @@ class NumpyPointMap:
         if not len(self):
             return np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
         if self._tree is None:
-            self._tree = KDTree(np.hstack([self._points, self._weight * self._normals]))
+            self._tree = scipy.spatial.KDTree(
+                np.hstack([self._points, self._weight * self._normals])
+            )
         asked = np.hstack([points, self._weight * normals])
         distance, index = self._tree.query(asked, distance_upper_bound=reach)
         return np.asarray(distance, dtype=np.float64), np.asarray(index, dtype=np.int64)

@@ -8,7 +8,6 @@ is small enough to score every one of them, on a raster of nearness.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2

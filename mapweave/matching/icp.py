@@ -11,7 +11,6 @@ partner's normal, because a wall holds a point across it and not along it.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
