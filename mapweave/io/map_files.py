@@ -58,6 +58,11 @@ def read_joint(path: str | Path) -> JointMap:
 def load(path: str | Path) -> RobotMap | JointMap:
     """Return the robot map or joint map in the file at `path`, whichever its format says.
 
+    Parameters
+    ----------
+    path
+        ``MAP.json`` or ``JOINT.json``, which may be gzipped; its content tells, not its name.
+
     Raises
     ------
     FileError
@@ -72,6 +77,13 @@ def load(path: str | Path) -> RobotMap | JointMap:
 
 def save(some_map: RobotMap | JointMap, path: str | Path) -> None:
     """Write a robot's map or a joint map to `path`, as `load` reads it; whole or not at all.
+
+    Parameters
+    ----------
+    some_map
+        The map.
+    path
+        The file: ``MAP.json`` or ``JOINT.json``, its numbers rounded to 0.1 mm and 1 µrad.
 
     Raises
     ------

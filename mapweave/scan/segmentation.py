@@ -61,7 +61,27 @@ class ScanSegments:
 
 
 def extract_segments(scan: Scan, parameters: SegmentationParameters | None = None) -> ScanSegments:
-    """Approximate the returns of `scan` by directed line segments (paper, V, first step)."""
+    """Approximate the returns of `scan` by directed line segments (paper, V, first step).
+
+    Parameters
+    ----------
+    scan
+        The scan; beams that did not come back belong to no segment.
+    parameters
+        How returns become segments.
+
+    Returns
+    -------
+    ScanSegments
+        In the sensor's frame [m], in beam order, with the segment of each beam.
+
+    Examples
+    --------
+    >>> angles = np.linspace(-0.5, 0.5, 60)
+    >>> wall = Scan(2 / np.cos(angles), angles)  # 2 m ahead, seen from the origin
+    >>> extract_segments(wall).segments.round(2)
+    array([[ 2.  , -1.09,  2.  ,  1.09]])
+    """
     p = parameters or SegmentationParameters()
     with np.errstate(invalid="ignore"):
         used = np.flatnonzero(scan.hits & (scan.ranges <= p.max_range))

@@ -2,7 +2,12 @@
 
 import numpy as np
 import pytest
+import scipy.signal
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
+from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.lines.directions import (
@@ -11,8 +16,10 @@ from mapweave.lines.directions import (
     direction_histogram,
     likely_turns,
     line_difference,
+    local_maxima,
     main_directions,
     nearest_direction,
+    prominences,
 )
 from tests.mapweave.buildings import BUILDING, part
 
@@ -142,3 +149,29 @@ def test_visible_sides_tell_half_a_turn_from_none() -> None:
     walls = np.array([[0.0, 0, 6, 0], [6, 0, 6, 4], [0, 4, 0, 0]])
     assert abs(likely_turns(walls, walls, 4, 0.17)[0]) < np.radians(1)
     assert abs(se2.wrap(likely_turns(walls, walls[:, [2, 3, 0, 1]], 4, 0.17)[0] - np.pi)) < 0.02
+
+
+@given(
+    st.lists(st.one_of(st.integers(0, 4), st.floats(0, 9)), min_size=3, max_size=60).map(
+        lambda values: np.array(values, dtype=float)
+    )
+)
+def test_peaks_and_their_prominences_are_scipys(values: FloatArray) -> None:
+    peaks, found = scipy.signal.find_peaks(values, prominence=0.0)
+    np.testing.assert_array_equal(local_maxima(values), peaks)
+    np.testing.assert_array_equal(prominences(values, local_maxima(values)), found["prominences"])
+
+
+@pytest.mark.parametrize(
+    ("segments", "weights", "complaint"),
+    [
+        ([[0.0, 0, 1, np.nan]], None, "^segments: expected finite"),
+        ([0.0, 0, 1, 1], None, r"^segments: expected \(n, 4\)"),
+        ([[0, 0], [1, 0], [1, 1]], [1.0], r"^weights: expected \(2,\)"),
+    ],
+)
+def test_what_is_no_wall_is_refused_by_name(
+    segments: ArrayLike, weights: ArrayLike, complaint: str
+) -> None:
+    with pytest.raises(ArgumentError, match=complaint):
+        main_directions(segments, weights)
