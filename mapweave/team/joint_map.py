@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.errors import ArgumentError
@@ -24,6 +23,7 @@ from mapweave.maps import (
     submaps_by_component,
 )
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, unite
 from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster, cluster_components
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
@@ -32,18 +32,20 @@ from mapweave.team.segment_confidence import SegmentConfidenceParameters, segmen
 Weave: TypeAlias = Callable[[Cluster, Sequence[Alignment]], tuple[Cluster, Mapping[str, LineMap]]]
 
 
-class JointParameters(BaseModel):
+class JointParameters(StageParameters):
     """How robots' maps become one."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    graph: AlignmentGraphParameters = AlignmentGraphParameters()
-    merging: MergingParameters = MergingParameters(max_step=0.25, max_cost=0.2)
-    simplification: SimplificationParameters = SimplificationParameters()
-    free_space: FreeSpaceParameters = FreeSpaceParameters()
-    raster: DistanceFieldParameters = DistanceFieldParameters()
-    max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
-    segments: SegmentConfidenceParameters = SegmentConfidenceParameters()
+    graph: AlignmentGraphParameters = derived(AlignmentGraphParameters.of)
+    merging: MergingParameters = derived(
+        lambda c: MergingParameters.of(c, max_step=0.25, max_cost=0.2)
+    )
+    simplification: SimplificationParameters = derived(SimplificationParameters.of)
+    free_space: FreeSpaceParameters = derived(FreeSpaceParameters.of)
+    raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)
+    max_gap: float = derived(
+        lambda c: c.mapping.max_gap, gt=0, description="[m] within a generalized polyline"
+    )
+    segments: SegmentConfidenceParameters = derived(SegmentConfidenceParameters.of)
 
 
 def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None) -> JointMap:
@@ -131,7 +133,11 @@ def build_joint_map(
 
 
 def build_team_map(
-    maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int, weaver: JointOptimizer
+    maps: Sequence[RobotMap],
+    alignments: Sequence[Alignment],
+    version: int,
+    weaver: JointOptimizer,
+    parameters: JointParameters | None = None,
 ) -> JointMap:
     """Return what the team knows, its robots' submaps woven together."""
     submaps = submaps_by_component(maps)
@@ -140,6 +146,7 @@ def build_team_map(
         lines,
         alignments,
         version,
+        parameters,
         weave=lambda cluster, judged: weaver.weave(cluster, submaps, judged),
     )
 
