@@ -27,8 +27,8 @@ class CorrelativeParameters(StageParameters):
     reach: float = derived(
         lambda c: min(10.0, 0.2 + 0.5 * c.robot.max_speed * c.sensor.interval),
         gt=0,
-        description="[m] of translation, each way: half of what is driven, and a step; beyond 10 m little"
-        " of the raster is left to compare with",
+        description="[m] of translation, each way: half of what is driven, and a step; beyond 10 m"
+        " little of the raster is left to compare with",
     )
     step: float = Field(0.2, gt=0, description="[m] between translations")
     turn_step: float = Field(0.052, gt=0, description="[rad] between rotations: 3 degrees")

@@ -2,13 +2,15 @@
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
 
+from mapweave.config import Config
 from mapweave.errors import ArgumentError
-from mapweave.fusion.align import align
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.geometry.arrays import FloatArray
 from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.polylines import group_polylines
@@ -18,6 +20,7 @@ from mapweave.maps import (
     JointComponent,
     JointMap,
     LineMap,
+    MadeWith,
     RobotMap,
     lines_of,
     submaps_by_component,
@@ -48,7 +51,11 @@ class JointParameters(StageParameters):
     segments: SegmentConfidenceParameters = derived(SegmentConfidenceParameters.of)
 
 
-def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None) -> JointMap:
+def fuse(
+    maps: Sequence[RobotMap],
+    alignments: Sequence[Alignment] | None = None,
+    config: Config | None = None,
+) -> JointMap:
     """Return the joint map of robots whose maps are complete: nothing grows any more.
 
     Parameters
@@ -57,6 +64,8 @@ def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None
         Of one robot each.
     alignments
         As of `mapweave.align`, of any of their pairs; by default all pairs are compared here.
+    config
+        What the joint map is made with, and says so; by default the default one.
 
     Returns
     -------
@@ -74,14 +83,17 @@ def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None
     >>> fuse([RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ())]).components
     ()
     """
+    config = config or Config()
     _check_robots(maps)
     if alignments is None:
         pairs = itertools.combinations(maps, 2)
-        alignments = [a for first, second in pairs for a in align(first, second)]
+        p = FusionParameters.of(config)
+        alignments = [a for first, second in pairs for a in align(first, second, p)]
     _check_components(maps, alignments)
     # Nothing grows any more, and there is no next time.
-    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1_000_000))
-    return build_team_map(maps, alignments, 1, weaver)
+    weaver = JointOptimizer(JointOptimizationParameters.of(config, newest=True, at_once=1_000_000))
+    joint = build_team_map(maps, alignments, 1, weaver, JointParameters.of(config))
+    return replace(joint, made_with=MadeWith.of(config))
 
 
 def _check_robots(maps: Sequence[RobotMap]) -> None:

@@ -51,7 +51,7 @@ class TrackerParameters(StageParameters):
     max_step: float = derived(
         lambda c: 0.5 + c.robot.max_speed * c.sensor.interval,
         gt=0,
-        description="[m] between scans that are tracked: what is driven, and 0.5 m for poses that err",
+        description="[m] between scans that are tracked: driven, and 0.5 m for poses that err",
     )
     prior_sigma: float = Field(0.5, gt=0, description="[m] of a prediction, in the alignment")
     prior_turn: float = Field(0.35, gt=0, description="[rad] the same for the turn")
