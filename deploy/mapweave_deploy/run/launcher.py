@@ -138,7 +138,7 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
     ):
         start_server(crew, plan, plan.store)
         for member in plan.members:
-            _start_agent(crew, plan, member)
+            start_agent(crew, plan, member)
         while not is_done(plan.robots, recorder.statuses):
             _follow(crew, inbox, recorder, display)
             _check_time(plan, deadline, _unfinished(plan, recorder))
@@ -172,7 +172,8 @@ def start_server(crew: ProcessGroup, plan: Plan, store: Path) -> None:
     )
 
 
-def _start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
+def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
+    """Start the agent of `member` on its part of the log."""
     first, behind_last = member.scans
     scans = ["--scans", f"{first}:{behind_last}"]
     source = ["--robot", member.robot, "--log", str(member.log), "--rate", plan.rate]
