@@ -294,9 +294,11 @@ def _number(text: str) -> object:
 def _first_problem(model: type[_Checked], error: ValidationError) -> ConfigError:
     """Return what is wrong with the first field that is, and what was expected there."""
     problem = error.errors(include_url=False, include_context=False)[0]
-    name = str(problem["loc"][0]) if problem["loc"] else ""
-    section = model.__name__.lower()
-    known, found = model.model_fields, reprlib.repr(problem["input"])
+    section, found = model.__name__.lower(), reprlib.repr(problem["input"])
+    known = model.model_fields
+    if not problem["loc"]:
+        return ConfigError("", section, f"expected values of {', '.join(known)}, found {found}")
+    name = str(problem["loc"][0])
     if name not in known:
         return ConfigError("", f"{section}.{name}", f"no such field; there are {', '.join(known)}")
     return ConfigError("", f"{section}.{name}", f"expected {_expected(known[name])}, found {found}")

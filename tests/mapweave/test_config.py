@@ -168,6 +168,22 @@ def test_a_value_given_by_a_program_is_checked_in_one_line_as_well() -> None:
         Robot(max_speed=0)
 
 
+@pytest.mark.parametrize(
+    ("values", "line"),
+    [
+        ({"robot": 5}, "robot: expected values of max_speed, max_turn_rate, found 5"),
+        ({"lidar": {}}, "config.lidar: no such field; there are sensor, robot, mapping"),
+        ({"sensor": {"rate": "x"}}, "sensor.rate: expected a number from 0.1 to 1000 [Hz]"),
+    ],
+)
+def test_sections_given_by_a_program_are_checked_in_one_line(
+    values: dict[str, object], line: str
+) -> None:
+    with pytest.raises(ConfigError) as raised:
+        Config.model_validate(values)
+    assert str(raised.value).startswith(line)
+
+
 def test_a_configuration_is_not_changed_once_it_is_made() -> None:
     config = Config()
     with pytest.raises(ValidationError, match="frozen"):
