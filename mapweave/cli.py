@@ -17,6 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeVar
 
+from mapweave.config import Config
 from mapweave.errors import MapweaveError
 
 T = TypeVar("T")
@@ -72,6 +73,27 @@ def not_negative(text: str) -> float:
     if not 0 <= value < math.inf:
         raise ValueError(f"{text}: expected a number, 0 or more")
     return value
+
+
+def add_config_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--config``; read it with `config_of`."""
+    parser.add_argument(
+        "--config",
+        metavar="FILE.toml",
+        type=Path,
+        help="sensor, robot and numbers of mapping; mapweave config shows them",
+    )
+
+
+def config_of(options: argparse.Namespace) -> Config:
+    """Return the configuration that ``--config`` and the environment make of the defaults.
+
+    Raises
+    ------
+    ConfigError
+        If there is something wrong with either.
+    """
+    return Config.load(options.config, os.environ)
 
 
 def _overview(points: Sequence[str]) -> str:

@@ -11,28 +11,37 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.lines.sightings import units
+from mapweave.parameters import StageParameters, derived
 
 
-class JoiningParameters(BaseModel):
+class JoiningParameters(StageParameters):
     """Which ends meet."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     reach: float = Field(0.5, gt=0, description="[m] between ends that may meet")
     max_extension: float = Field(0.3, ge=0, description="[m] by which a wall may grow to meet")
-    max_overhang: float = Field(
-        0.12, ge=0, description="[m] that an end may stand out of the other wall to be cut off"
+    max_overhang: float = derived(
+        lambda c: 6 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] that an end may stand out of the other wall to be cut off",
     )
     min_angle: float = Field(
         np.deg2rad(3.0), gt=0, description="[rad] below it lines cross anywhere: ends meet halfway"
     )
-    max_shift: float = Field(0.03, ge=0, description="[m] by which an end may move sideways")
-    max_crossing: float = Field(0.1, ge=0, description="[m] of free space that noise may explain")
+    max_shift: float = derived(
+        lambda c: 1.5 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] by which an end may move sideways",
+    )
+    max_crossing: float = derived(
+        lambda c: 5 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] of free space that noise may explain",
+    )
     min_length: float = Field(0.1, gt=0, description="[m] below which no wall is cut")
 
 

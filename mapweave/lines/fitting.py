@@ -7,21 +7,22 @@ wall that is bent, or was seen twice at different places.
 
 import numpy as np
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.lines.directions import line_difference, nearest_direction
 from mapweave.lines.sightings import Nearness, Sightings, units
+from mapweave.parameters import StageParameters, derived
 
 
-class FittingParameters(BaseModel):
+class FittingParameters(StageParameters):
     """What belongs to a segment, and where it ends."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    tolerance: float = Field(
-        0.09, gt=0, description="[m] to either side, what is of the segment's surface"
+    tolerance: float = derived(
+        lambda c: 4.5 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] to either side, what is of the segment's surface",
     )
     shadow: float = Field(0.3, gt=0, description="[m] to either side, where it might be instead")
     parallel: float = Field(
@@ -29,8 +30,10 @@ class FittingParameters(BaseModel):
     )
     reach: float = Field(0.3, ge=0, description="[m] beyond its ends, what a fit may take up")
     station: float = Field(0.1, gt=0, description="[m] of a segment that is kept or cut as one")
-    max_hole: float = Field(
-        0.3, ge=0, description="[m] without evidence that a segment bridges; half a narrow door"
+    max_hole: float = derived(
+        lambda c: 0.5 * c.mapping.door,
+        ge=0,
+        description="[m] without evidence that a segment bridges; half a narrow door",
     )
     rounds: int = Field(1, ge=0, description="of fitting")
     opening_depth: float = Field(

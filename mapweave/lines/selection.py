@@ -10,19 +10,20 @@ nothing more, which is why no wall is doubled.
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.lines.sightings import Nearness, Sightings
+from mapweave.parameters import StageParameters, derived
 
 
-class SelectionParameters(BaseModel):
+class SelectionParameters(StageParameters):
     """What a segment explains, and what it must be worth."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    tolerance: float = Field(
-        0.09, gt=0, description="[m] within which a segment explains what was seen"
+    tolerance: float = derived(
+        lambda c: 4.5 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] within which a segment explains what was seen",
     )
     min_cosine: float = Field(
         -0.5,

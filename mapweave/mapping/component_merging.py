@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import groupby, pairwise
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.fusion.align import FusionParameters, compare, prepare
 from mapweave.fusion.decision import DecisionParameters
@@ -20,16 +20,17 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.place_recognition import PlaceRecognitionParameters, PlaceRecognizer
 from mapweave.maps import Alignment, Submap, lines_of
 from mapweave.matching.hypotheses import PreparedMap
+from mapweave.parameters import StageParameters, derived
 
 
-class ComponentMergingParameters(BaseModel):
+class ComponentMergingParameters(StageParameters):
     """When components are compared, and where a robot that lost track is looked for."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     # Nothing undoes a join within a robot's map, so a shape is asked for, not straight walls alone.
-    fusion: FusionParameters = FusionParameters(decision=DecisionParameters(plain_held=math.inf))
-    place_recognition: PlaceRecognitionParameters = PlaceRecognitionParameters()
+    fusion: FusionParameters = derived(
+        lambda c: FusionParameters.of(c, decision=DecisionParameters.of(c, plain_held=math.inf))
+    )
+    place_recognition: PlaceRecognitionParameters = derived(PlaceRecognitionParameters.of)
     min_confidence: float = Field(
         0.5,
         gt=0,
@@ -43,9 +44,15 @@ class ComponentMergingParameters(BaseModel):
     growth: float = Field(
         0.15, gt=0, description="share by which either has grown before a pair is compared again"
     )
-    reach: float = Field(3.0, gt=0, description="[m] that a robot came while it was lost, at most")
-    max_reach: float = Field(
-        7.5, gt=0, description="[m] the same with a piece in between, its path included"
+    reach: float = derived(
+        lambda c: 1.5 * c.robot.max_speed,
+        gt=0,
+        description="[m] that a robot came while it was lost, at most",
+    )
+    max_reach: float = derived(
+        lambda c: 3.75 * c.robot.max_speed,
+        gt=0,
+        description="[m] the same with a piece in between, its path included",
     )
     gaps: int = Field(
         2, ge=1, description="between two components where it is looked for, the last"

@@ -12,17 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, join_points
 
 
-class IcpParameters(BaseModel):
+class IcpParameters(StageParameters):
     """How far points look for partners and how strongly they pull."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     normal_weight: float = Field(
         0.4, gt=0, description="[m] how far apart opposite normals hold two points, halved"
@@ -32,14 +31,18 @@ class IcpParameters(BaseModel):
         gt=0,
         description="[m] residual at which a pair's weight is a quarter, first iteration",
     )
-    end_scale: float = Field(0.04, gt=0, description="[m] the same at the end: some 2 sigma (SICK)")
+    end_scale: float = derived(
+        lambda c: 2 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] the same at the end: some 2 sigma (SICK)",
+    )
     shrink: float = Field(0.75, gt=0, lt=1, description="of the scale, each iteration")
     max_iterations: int = Field(25, ge=1)
     converged: float = Field(
         2e-4, gt=0, description="[m, rad] smallest step worth another iteration"
     )
-    noise: float = Field(
-        0.1,
+    noise: float = derived(
+        lambda c: c.sensor.residual_sigma,
         gt=0,
         description="[m] of a residual against the prior; above the sensor's, because neighbouring"
         " returns err alike",

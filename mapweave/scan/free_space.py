@@ -8,25 +8,28 @@ from collections.abc import Iterable
 
 import numpy as np
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.scan import Scan
 from mapweave.scan.visibility import clear_ranges
 
 
-class FreeSpaceParameters(BaseModel):
+class FreeSpaceParameters(StageParameters):
     """How far and how surely a scan clears space."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    sight: float = Field(
-        10.0, gt=0, description="[m] beyond, neighbouring beams are too far apart to prove much"
+    sight: float = derived(
+        lambda c: c.mapping.free_range,
+        gt=0,
+        description="[m] beyond, neighbouring beams are too far apart to prove much",
     )
-    margin: float = Field(0.15, ge=0, description="[m] kept from what the beams hit")
+    margin: float = derived(
+        lambda c: 0.5 * c.mapping.clearance, ge=0, description="[m] kept from what the beams hit"
+    )
     simplification: float = Field(
         0.1, gt=0, description="[m] by which outlines may deviate; below the margin"
     )

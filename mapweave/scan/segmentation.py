@@ -11,19 +11,20 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.scan import Scan
 
 
-class SegmentationParameters(BaseModel):
+class SegmentationParameters(StageParameters):
     """How returns become segments."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    max_range: float = Field(
-        30.0, gt=0, description="[m] farther returns are left out: their spacing hides the shape"
+    max_range: float = derived(
+        lambda c: 1.2 * c.mapping.far_range,
+        gt=0,
+        description="[m] farther returns are left out: their spacing hides the shape",
     )
     max_jump: float = Field(
         0.25, gt=0, description="[m] between neighbouring returns of one surface, at close range"
@@ -34,8 +35,10 @@ class SegmentationParameters(BaseModel):
         description="[rad] flattest angle at which a beam still meets a surface: neighbouring"
         " returns of one surface lie at most range x spacing / sin(grazing) apart",
     )
-    tolerance: float = Field(
-        0.04, gt=0, description="[m] largest deviation of a return from its segment (SICK: 1-2 cm)"
+    tolerance: float = derived(
+        lambda c: 2 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] largest deviation of a return from its segment (SICK: 1-2 cm)",
     )
     relative_tolerance: float = Field(
         0.004, ge=0, description="[m/m] what the tolerance grows with range"
