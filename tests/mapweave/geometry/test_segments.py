@@ -13,7 +13,7 @@ def test_a_length_is_the_distance_of_the_ends() -> None:
 
 def test_a_direction_is_a_unit_vector_and_nothing_where_there_is_no_length() -> None:
     directions, length = units(SEGMENTS)
-    np.testing.assert_allclose(directions, [[0.6, 0.8], [0, 0], [0, -1]])
+    np.testing.assert_allclose(directions, np.array([[0.6, 0.8], [0, 0], [0, -1]]))
     assert length.tolist() == [5, 0, 1]
 
 
