@@ -1,9 +1,11 @@
 """Which tests ``make quick`` runs."""
 
+import time
 from pathlib import Path
 
 import pytest
 
+from tools.deadline import TIME, Deadline
 from tools.durations import REST, summed
 from tools.imports import distances, distances_of_tests, imported_names, module_name
 from tools.quick import choose
@@ -83,3 +85,12 @@ def test_tests_that_were_never_timed_are_run() -> None:
 
 def test_the_cases_of_a_test_are_timed_together_and_short_tests_as_one() -> None:
     assert summed(REPORT) == {"tests/a/test_b.py": {REST: 0.2, "test_c": 5.0}}
+
+
+def test_when_the_time_is_up_what_has_not_begun_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, deadline = iter([100.0, 100.0, 100.0 + TIME, 100.1 + TIME]), Deadline()
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    deadline.pytest_runtest_setup()
+    deadline.pytest_runtest_setup()
+    with pytest.raises(pytest.skip.Exception):
+        deadline.pytest_runtest_setup()
