@@ -37,7 +37,7 @@ def _try(version: str, *, lowest: bool) -> str:
     inside = make_environment(folder, python, lowest=lowest)
     environment = {**os.environ, "PYTHONSAFEPATH": "1", "MAPWEAVE_INSTALLED": "1"}
     options = ["-q", "-n", "2", "-m", "not slow", *(f"--deselect={test}" for test in _long_tests())]
-    command = [inside.with_name("pytest"), *options]
+    command = [str(inside.with_name("pytest")), *options]
     done = subprocess.run(command, cwd=ROOT, env=environment, check=False)
     return "failed" if done.returncode else "passed"
 
