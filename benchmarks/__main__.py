@@ -15,6 +15,7 @@ from benchmarks import (
     mapping,
     peers,
     reference,
+    same_results,
     team,
     wire,
 )
@@ -40,6 +41,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "fusion": fusion,
     "reference": reference,
     "peers": peers,
+    "same-results": same_results,
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,

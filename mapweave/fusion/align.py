@@ -20,6 +20,7 @@ from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
 from mapweave.fusion.parts import PartParameters, agreed, cut
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.maps import Alignment, LineMap, RobotMap, component_name
 from mapweave.matching.distance_field import DistanceFieldParameters
 from mapweave.matching.hypotheses import HypothesisParameters, PreparedMap, different, hypothesise
@@ -151,7 +152,7 @@ def align_maps(
 
 def prepare(lines: LineMap, p: FusionParameters) -> PreparedMap | None:
     """Return what comparing `lines` takes; None where there is too little wall to compare."""
-    wall = np.hypot(*(lines.segments[:, 2:] - lines.segments[:, :2]).T).sum()
+    wall = lengths(lines.segments).sum()
     return PreparedMap.of(lines, p.hypotheses, p.raster) if wall >= p.min_wall else None
 
 

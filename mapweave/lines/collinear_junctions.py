@@ -9,8 +9,8 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.lines.corner_junctions import cross, length_inside, neighbours
-from mapweave.lines.sightings import units
+from mapweave.geometry.segments import cross, units
+from mapweave.lines.corner_junctions import length_inside, neighbours
 from mapweave.parameters import StageParameters, derived
 
 

@@ -15,7 +15,7 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
-from mapweave.lines.sightings import units
+from mapweave.geometry.segments import cross, units
 from mapweave.parameters import StageParameters, derived
 
 
@@ -139,8 +139,3 @@ def neighbours(segments: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
     near = ends.sparse_distance_matrix(starts, reach, output_type="ndarray")
     a, b = near["i"].astype(np.int64), near["j"].astype(np.int64)
     return a[a != b], b[a != b]
-
-
-def cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return (k,) cross products of (k, 2) vectors."""
-    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])

@@ -11,8 +11,9 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.segments import units
 from mapweave.lines.directions import line_difference, nearest_direction
-from mapweave.lines.sightings import Nearness, Sightings, units
+from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.parameters import StageParameters, derived
 
 

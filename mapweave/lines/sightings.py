@@ -5,23 +5,14 @@ their sightings stand for them: a segment seen by 30 scans is 30 times its lengt
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.segments import sample, units
 
 DIRECTION_BINS = 24  # of a full turn: sightings 15° apart are gathered
-
-
-class Samples(NamedTuple):
-    """Points along segments: (n, 2) points and unit directions, (n,) metres each stands for."""
-
-    points: FloatArray
-    directions: FloatArray
-    lengths: FloatArray
-    owner: IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,21 +103,3 @@ class Nearness:
         beyond = np.maximum(np.maximum(-along, along - lengths[segment]), 0.0)
         cosine = (own[segment] * directions[sample]).sum(axis=1)
         return cls(segment, sample, along, across, np.hypot(across, beyond), cosine)
-
-
-def sample(segments: FloatArray, spacing: float) -> Samples:
-    """Return points in the middle of equal parts, `spacing` [m] at most, of (n, 4) `segments`."""
-    directions, lengths = units(segments)
-    counts = np.maximum(1, np.ceil(lengths / spacing)).astype(np.int64)
-    owner = np.repeat(np.arange(len(segments)), counts)
-    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    part = (lengths / counts)[owner]
-    points = segments[owner, :2] + ((rank + 0.5) * part)[:, None] * directions[owner]
-    return Samples(points, directions[owner], part, owner)
-
-
-def units(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (n, 2) unit directions and (n,) lengths [m] of (n, 4) `segments`."""
-    vectors = segments[:, 2:] - segments[:, :2]
-    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
-    return vectors / np.maximum(lengths, 1e-12)[:, None], lengths

@@ -10,13 +10,14 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.segments import sample, units
 from mapweave.lines.collinear_junctions import StraighteningParameters, straighten
 from mapweave.lines.corner_junctions import JoiningParameters, join_corners
 from mapweave.lines.directions import main_directions
 from mapweave.lines.fitting import FittingParameters, cut, fit, follow, trim
 from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.selection import SelectionParameters, explained, select, shadowed
-from mapweave.lines.sightings import Nearness, Sightings, sample, units
+from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.lines.t_junctions import WallEndParameters, meet_walls
 from mapweave.parameters import StageParameters, derived
 

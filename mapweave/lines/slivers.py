@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.lines.merging import Evolution
 from mapweave.parameters import StageParameters, derived
 
@@ -54,10 +55,10 @@ def absorb_slivers(
         that each took over, and where every input went.
     """
     chosen = parameters or SliverParameters()
-    lengths = np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
+    length = lengths(segments)
     owner = np.arange(len(segments))
-    for number in np.flatnonzero(lengths <= chosen.max_length):
-        longer = np.flatnonzero(lengths > lengths[number])  # so no two own each other
+    for number in np.flatnonzero(length <= chosen.max_length):
+        longer = np.flatnonzero(length > length[number])  # so no two own each other
         distance = _distance(segments[number], segments[longer], chosen.max_angle)
         if len(longer) and distance.min() <= chosen.max_distance:
             owner[number] = longer[np.argmin(distance)]

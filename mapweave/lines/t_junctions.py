@@ -11,8 +11,8 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
-from mapweave.lines.corner_junctions import cross, length_inside
-from mapweave.lines.sightings import units
+from mapweave.geometry.segments import cross, units
+from mapweave.lines.corner_junctions import length_inside
 from mapweave.parameters import StageParameters, derived
 
 

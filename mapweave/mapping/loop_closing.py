@@ -119,13 +119,13 @@ class LoopCloser:
         if len(newest.map.segments) == 0:
             return []
         paths = self.graph.lengths_from(newest.id, len(submaps))
-        here = middle(newest)
+        here = middle_of_path(newest)
         near = [
             (distance, path, s)
             for s, path in zip(older[:-1], paths, strict=False)
             if s.component == newest.component
             and len(s.map.segments)
-            and (distance := math.dist(middle(s), here)) < p.reach + _drift(path, p)
+            and (distance := math.dist(middle_of_path(s), here)) < p.reach + _drift(path, p)
         ]
         nearest = sorted(near, key=lambda item: item[0])[: p.candidates]
         return [self.compare_two(s, newest, path) for _, path, s in nearest]
@@ -154,7 +154,7 @@ class LoopCloser:
         return raster, Target.of(raster.oriented, self._parameters.icp)
 
 
-def middle(submap: Submap) -> FloatArray:
+def middle_of_path(submap: Submap) -> FloatArray:
     """(2,) middle of a submap's path, component frame [m]."""
     return se2.transform_points(submap.pose, submap.trajectory.pose[:, :2].mean(axis=0))
 

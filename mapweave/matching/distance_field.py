@@ -11,6 +11,7 @@ import scipy
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
+from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, points_on_lines
@@ -68,10 +69,10 @@ class DistanceField:
         """Rasterise `line_map`, which has at least one segment."""
         p = parameters
         oriented, segment = points_on_lines(line_map, p.spacing)
-        lengths = np.hypot(*(line_map.segments[:, 2:] - line_map.segments[:, :2]).T)
-        counts = np.bincount(segment, minlength=len(lengths))
+        length = lengths(line_map.segments)
+        counts = np.bincount(segment, minlength=len(length))
         trust = np.minimum(1.0, line_map.support / p.full_support)
-        weight = (trust * lengths / np.maximum(counts, 1))[segment]
+        weight = (trust * length / np.maximum(counts, 1))[segment]
         low = oriented.points.min(axis=0) - p.border
         high = oriented.points.max(axis=0) + p.border
         cell = max(p.cell, float(np.sqrt(np.prod(high - low) / p.max_cells)))

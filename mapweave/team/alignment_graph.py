@@ -96,7 +96,7 @@ class _Graph:
     ) -> None:
         self._names, self._parameters = names, parameters
         self._number = {name: number for number, name in enumerate(names)}
-        self._middles = np.array([_middle(rasters.get(name)) for name in names])
+        self._middles = np.array([_frame_at_middle(rasters.get(name)) for name in names])
         links = [a for a in alignments if a.decision == "accepted" and a.reference != a.other]
         # In an order of their own, so that the order in which they came changes nothing.
         links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
@@ -238,7 +238,7 @@ def _covariance(edge: Edge, p: AlignmentGraphParameters) -> FloatArray:
     return np.diag([squared, squared, p.turn_sigma**2])
 
 
-def _middle(raster: DistanceField | None) -> FloatArray:
+def _frame_at_middle(raster: DistanceField | None) -> FloatArray:
     """(3,) frame at the middle of a map's wall; the map's own where it has seen none."""
     x, y = raster.oriented.points.mean(axis=0) if raster else (0.0, 0.0)
     return np.array([x, y, 0.0])

@@ -12,6 +12,7 @@ from mapweave.config import Config
 from mapweave.errors import ArgumentError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.polylines import group_polylines
 from mapweave.lines.simplification import SimplificationParameters, simplify, sources
@@ -203,6 +204,5 @@ def _join(
 def _merged(everything: LineMap, free: BaseGeometry, p: JointParameters) -> FloatArray:
     """Return (n, 4) the walls of all submaps, merged (paper, VI) and simplified."""
     seen, support = everything.segments, everything.support
-    lengths = np.hypot(*(seen[:, 2:] - seen[:, :2]).T)
-    merged = evolve(seen, lengths * support, p.merging).segments
+    merged = evolve(seen, lengths(seen) * support, p.merging).segments
     return simplify(merged, seen, support, free, p.simplification)

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle
+from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle_of_path
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.mapping.submap_graph import joining_covariance, tracking_covariance
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory, lines_of
@@ -62,7 +62,8 @@ class _Node:
     @classmethod
     def of(cls, component: str, frame: FloatArray, submap: Submap) -> "_Node":
         placed = replace(submap, pose=se2.compose(frame, submap.pose))
-        x, y = middle(placed).tolist() if len(submap.trajectory.pose) else placed.pose[:2].tolist()
+        driven = len(submap.trajectory.pose) > 0
+        x, y = (middle_of_path(placed) if driven else placed.pose[:2]).tolist()
         return cls(component, placed, (x, y))
 
 

@@ -7,8 +7,8 @@ from shapely.geometry import Polygon
 from benchmarks.compactness import compactness
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.segments import units
 from mapweave.lines.merging import evolve
-from mapweave.lines.sightings import units
 from mapweave.lines.simplification import simplify, sources
 from tests.mapweave.buildings import BUILDING, random_pose, rectangle, walls_of
 
