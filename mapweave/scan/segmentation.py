@@ -61,7 +61,20 @@ class ScanSegments:
 
 
 def extract_segments(scan: Scan, parameters: SegmentationParameters | None = None) -> ScanSegments:
-    """Approximate the returns of `scan` by directed line segments (paper, V, first step)."""
+    """Approximate the returns of `scan` by directed line segments (paper, V, first step).
+
+    Parameters
+    ----------
+    scan
+        One sweep.
+    parameters
+        How far a return may be off its segment, and where one surface ends.
+
+    Returns
+    -------
+    ScanSegments
+        In the sensor's frame, in beam order, and which return belongs to which.
+    """
     p = parameters or SegmentationParameters()
     with np.errstate(invalid="ignore"):
         used = np.flatnonzero(scan.hits & (scan.ranges <= p.max_range))
@@ -81,7 +94,18 @@ def extract_segments(scan: Scan, parameters: SegmentationParameters | None = Non
 
 
 def fit_segment(points: FloatArray) -> FloatArray:
-    """Return the (4,) total-least-squares segment of (k, 2) `points`, along their order."""
+    """Return the segment that fits points best by total least squares.
+
+    Parameters
+    ----------
+    points
+        (k, 2) [m], k at least 2, in beam order.
+
+    Returns
+    -------
+    FloatArray
+        (4,) x1 y1 x2 y2 [m], directed as the points come.
+    """
     centre, direction = _fit_line(points)
     along = (points - centre) @ direction
     return np.concatenate([centre + along.min() * direction, centre + along.max() * direction])
