@@ -19,6 +19,8 @@ ARRAYS = {
     "ndarray[tuple[Any, ...], dtype[complex128]]": "ComplexArray",
 }
 
+WITHOUT = "   :exclude-members: model_config\n"  # pydantic's own
+
 
 class Room(SphinxDirective):
     """Shows a package and its modules, each under a heading of its own.
@@ -38,7 +40,7 @@ class Room(SphinxDirective):
 
 
 def _automodule(name: str) -> str:
-    return f".. automodule:: {name}\n   :members:\n   :ignore-module-all:\n"
+    return f".. automodule:: {name}\n   :members:\n   :ignore-module-all:\n{WITHOUT}"
 
 
 def _modules(package: str) -> Iterator[str]:
@@ -62,8 +64,13 @@ def _tell_parameters(
     if told:
         lines += ["", "Fields:", ""]
     for key, field in told:
-        default = "" if field.is_required() else f" = {field.default!r}"
+        default = "" if field.is_required() else f" = {_value(field.default)}"
         lines += [f"- ``{key}{default}``: {field.description}"]
+
+
+def _value(default: object) -> str:
+    """Return a default as a person would write it."""
+    return f"{default:.4g}" if isinstance(default, float) else repr(default)
 
 
 def _tell_apart(
