@@ -226,7 +226,7 @@ def test_every_name_in_a_python_example_exists(code: str) -> None:
 
 def test_a_joint_map_has_what_the_example_prints() -> None:
     (joint_map,) = get_args(get_type_hints(joint_maps)["return"])
-    examples = "\n".join(README.blocks("python"))
+    (examples,) = [code for code in README.blocks("python") if "joint_maps" in code]
     used = {
         (joint_map if owner == "joint" else JointComponent, field)
         for owner, field in re.findall(r"\b(joint|component)\.(\w+)", examples)

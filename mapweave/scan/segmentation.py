@@ -61,20 +61,7 @@ class ScanSegments:
 
 
 def extract_segments(scan: Scan, parameters: SegmentationParameters | None = None) -> ScanSegments:
-    """Approximate the returns of `scan` by directed line segments (paper, V, first step).
-
-    Parameters
-    ----------
-    scan
-        One sweep.
-    parameters
-        How far a return may be off its segment, and where one surface ends.
-
-    Returns
-    -------
-    ScanSegments
-        In the sensor's frame, in beam order, and which return belongs to which.
-    """
+    """Approximate the returns of `scan` by directed line segments (paper, V, first step)."""
     p = parameters or SegmentationParameters()
     with np.errstate(invalid="ignore"):
         used = np.flatnonzero(scan.hits & (scan.ranges <= p.max_range))
