@@ -35,7 +35,7 @@ MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 MAKE_TARGET = re.compile(r"^make ([a-z-]+)")
-BENCHMARK = re.compile(r"python -m benchmarks ([a-z]\w*)")
+BENCHMARK = re.compile(r"python -m benchmarks ([a-z][\w-]*)")
 TABLED: dict[str, type[BaseModel]] = {
     "MAP.json": MapFile,
     "submaps[]": SubmapFile,
