@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: demo test test-all lint docs bench bench-map bench-fusion clean
+.PHONY: demo test test-all lint bench bench-map bench-fusion clean
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -28,12 +28,13 @@ test: lint
 test-all: lint
 	$(BIN)/pytest -n 2
 
+bench: $(STAMP)
+	$(BIN)/python -m benchmarks
+
+.PHONY: docs
 docs: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs/reference site
-
-bench: $(STAMP)
-	$(BIN)/python -m benchmarks
 
 bench-map: $(STAMP)
 	$(BIN)/python -m benchmarks map
@@ -43,5 +44,5 @@ bench-fusion: $(STAMP)
 	$(BIN)/python -m benchmarks fusion
 
 clean:
-	rm -rf .venv demo team bench site .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv demo team bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
