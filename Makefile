@@ -44,5 +44,5 @@ bench-fusion: $(STAMP)
 	$(BIN)/python -m benchmarks fusion
 
 clean:
-	rm -rf .venv demo team bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv site demo team bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
