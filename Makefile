@@ -65,6 +65,11 @@ durations: .venv-wheel/.installed
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks
 
+.PHONY: docs
+docs: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs/reference site
+
 bench-map: $(STAMP)
 	$(BIN)/python -m benchmarks map
 	$(BIN)/python -m benchmarks kidnap
@@ -74,7 +79,7 @@ bench-fusion: $(STAMP)
 
 # What was made of the sources; results (demo, team, bench) stay.
 clean:
-	rm -rf .venv .venv-wheel .matrix dist
+	rm -rf .venv .venv-wheel .matrix dist site
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

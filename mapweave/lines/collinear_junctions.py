@@ -39,6 +39,15 @@ def straighten(
 
     Always the pair that deviates least from its chord next, as Douglas and Peucker would keep
     the point that deviates most.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    free
+        What was seen through, the same frame [m]: no gap is bridged there.
+    parameters
+        Which pieces are of one wall.
     """
     walls = segments
     while True:

@@ -60,7 +60,14 @@ def join_corners(
 ) -> FloatArray:
     """Return (n, 4) `segments` [m] with ends that meet where they nearly did.
 
-    `free` is what was seen through, the same frame: no wall grows into it.
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    free
+        What was seen through, the same frame [m]: no wall grows into it.
+    parameters
+        Which ends meet.
     """
     found = _meetings(segments, parameters)
     open_ = _is_open(segments, found, free, parameters.max_crossing)
@@ -111,7 +118,20 @@ def _is_open(
 
 
 def length_inside(paths: FloatArray, free: BaseGeometry) -> FloatArray:
-    """Return (k,) how much of (k, j, 2) paths lies in `free` [m]."""
+    """Return how much of each path lies in `free`.
+
+    Parameters
+    ----------
+    paths
+        (k, j, 2) the vertices of k paths [m].
+    free
+        An area, the same frame [m].
+
+    Returns
+    -------
+    FloatArray
+        (k,) [m].
+    """
     if not len(paths):
         return np.empty(0)
     return np.asarray(shapely.length(shapely.intersection(shapely.linestrings(paths), free)))
@@ -132,7 +152,20 @@ def _cheapest(found: _Meetings, allowed: IntArray) -> IntArray:
 
 
 def neighbours(segments: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Return pairs of segments, the end of the one within `reach` [m] of the other's start."""
+    """Return pairs of segments, the end of the one close to the start of the other.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m].
+    reach
+        [m] from the end to the start at most.
+
+    Returns
+    -------
+    tuple of IntArray
+        (k,) the segment that ends there, and (k,) that which starts.
+    """
     if not len(segments):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     ends, starts = scipy.spatial.KDTree(segments[:, 2:]), scipy.spatial.KDTree(segments[:, :2])

@@ -68,7 +68,17 @@ class MergingParameters(StageParameters):
 
 
 class Pairing:
-    """What pairs cost and become, under the main directions of all segments (VI-A)."""
+    """What pairs cost and become, under the main directions of all segments (VI-A).
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m]: all of them, for the main directions.
+    weights
+        (n,) what each contributes to these [m].
+    parameters
+        Which are merged, and into what direction.
+    """
 
     def __init__(
         self, segments: FloatArray, weights: FloatArray, parameters: MergingParameters
@@ -106,5 +116,5 @@ class Pairing:
         return np.where(possible, cost, np.inf)
 
     def merged(self, pairs: Pairs) -> FloatArray:
-        """Return the (k, 4) merged segments."""
+        """Return the (k, 4) merged segments x1 y1 x2 y2 [m], directed as the first of each pair."""
         return merged_segments(pairs, self.direction(pairs), self._parameters.end_noise)

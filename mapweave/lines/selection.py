@@ -49,9 +49,23 @@ class SelectionParameters(StageParameters):
 def select(
     candidates: FloatArray, evidence: Sightings, price: float, parameters: SelectionParameters
 ) -> IntArray:
-    """Return which of (n, 4) `candidates` [m] to keep, the one that explains most first.
+    """Return which candidates to keep, the one that explains most first.
 
-    `price` is the weight of evidence [m] below which none is kept.
+    Parameters
+    ----------
+    candidates
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    evidence
+        What was seen, the same frame.
+    price
+        The weight of evidence [m] below which none is kept.
+    parameters
+        What a segment explains.
+
+    Returns
+    -------
+    IntArray
+        (k,) indices of candidates, in the order in which they were chosen.
     """
     near = Nearness.of(
         candidates,

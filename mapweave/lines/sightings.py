@@ -42,7 +42,17 @@ class Sightings:
 
     @classmethod
     def of(cls, segments: FloatArray, counts: FloatArray | IntArray, spacing: float) -> "Sightings":
-        """Sample (n, 4) `segments` [m], each seen (n,) `counts` times, every `spacing` [m]."""
+        """Sample sightings.
+
+        Parameters
+        ----------
+        segments
+            (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+        counts
+            (n,) how often each was seen.
+        spacing
+            [m] between samples at most.
+        """
         samples = sample(segments, spacing)
         weights = np.asarray(counts[samples.owner] * samples.lengths, dtype=np.float64)
         return cls(samples.points, samples.directions, weights, spacing)
@@ -93,7 +103,17 @@ class Nearness:
     def of(
         cls, segments: FloatArray, points: FloatArray, directions: FloatArray, reach: float
     ) -> "Nearness":
-        """Pair (n, 4) `segments` [m] with the (m, 2) `points` within `reach` [m] of them."""
+        """Pair segments with the points close to them.
+
+        Parameters
+        ----------
+        segments
+            (n, 4) x1 y1 x2 y2 [m].
+        points, directions
+            (m, 2) [m], the same frame, and unit vectors.
+        reach
+            [m] from a segment at most.
+        """
         tree = shapely.STRtree(shapely.points(points))
         lines = shapely.linestrings(segments.reshape(-1, 2, 2))
         segment, sample = tree.query(lines, predicate="dwithin", distance=reach)

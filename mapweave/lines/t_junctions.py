@@ -41,7 +41,14 @@ def meet_walls(
 ) -> FloatArray:
     """Return (n, 4) `segments` [m] with their loose ends at the walls that they nearly reach.
 
-    `free` is what was seen through, the same frame: no wall grows into it.
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    free
+        What was seen through, the same frame [m]: no wall grows into it.
+    parameters
+        Which ends are at a wall.
     """
     if len(segments) < 2:
         return segments

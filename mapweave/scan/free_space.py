@@ -38,7 +38,22 @@ class FreeSpaceParameters(StageParameters):
 
 
 def scan_free_space(scan: Scan, pose: FloatArray, parameters: FreeSpaceParameters) -> BaseGeometry:
-    """Return what `scan`, taken at `pose` (3,), saw to be free: polygons in the pose's parent."""
+    """Return what a scan saw to be free.
+
+    Parameters
+    ----------
+    scan
+        One sweep.
+    pose
+        (3,) of the sensor [m, m, rad].
+    parameters
+        How far and how surely a scan clears space.
+
+    Returns
+    -------
+    BaseGeometry
+        An area [m] in the frame that `pose` is given in; empty where nothing was cleared.
+    """
     reach = np.maximum(clear_ranges(scan, parameters.sight) - parameters.margin, 0.0)
     rim = reach[:, None] * np.column_stack([np.cos(scan.angles), np.sin(scan.angles)])
     fans = [
@@ -52,7 +67,15 @@ def scan_free_space(scan: Scan, pose: FloatArray, parameters: FreeSpaceParameter
 
 
 def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> BaseGeometry:
-    """Return the union of `pieces`, its outline simplified, crumbs left out."""
+    """Return the union of `pieces`, its outline simplified, crumbs left out.
+
+    Parameters
+    ----------
+    pieces
+        Areas in one frame [m], such as those of several scans.
+    parameters
+        How much an outline is simplified, and what is a crumb.
+    """
     union = shapely.union_all(list(pieces))
     # Opened: a view through a crack clears nothing that would matter, and costs many vertices.
     if union.is_empty:
@@ -65,7 +88,18 @@ def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> Ba
 
 
 def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:
-    """Return simple polygons without holes that cover `free_space`, each (k, 2) [m]."""
+    """Return simple polygons without holes that cover `free_space`, as maps hold them.
+
+    Parameters
+    ----------
+    free_space
+        An area [m]; its holes are cut through.
+
+    Returns
+    -------
+    tuple of FloatArray
+        (k, 2) the vertices of each [m], the first one not repeated.
+    """
     return tuple(
         np.array(piece.exterior.coords)[:-1]
         for polygon in _polygons(free_space)
@@ -74,7 +108,13 @@ def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:
 
 
 def from_rings(outlines: Iterable[FloatArray]) -> BaseGeometry:
-    """Return the union of simple polygons (k, 2) [m]; the inverse of `rings`."""
+    """Return the union of simple polygons; the inverse of `rings`.
+
+    Parameters
+    ----------
+    outlines
+        (k, 2) the vertices of each [m], one frame; those of fewer than three are no area.
+    """
     polygons = [Polygon(ring) for ring in outlines if len(ring) >= 3]
     return shapely.union_all(shapely.make_valid(polygons)) if polygons else Polygon()
 

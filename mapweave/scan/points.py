@@ -40,17 +40,17 @@ class OrientedPoints:
         return len(self.points)
 
     def moved(self, pose: FloatArray) -> "OrientedPoints":
-        """Return the same surface, given in the frame at `pose` (3,), in that frame's parent."""
+        """Return the same points, given in the frame at `pose` (3,), in that frame's parent."""
         normals: FloatArray = self.normals @ se2.rotation(pose[2]).T
         return OrientedPoints(se2.transform_points(pose, self.points), normals, self.polyline)
 
     def at(self, index: IntArray | BoolArray | slice) -> "OrientedPoints":
-        """Return the points selected by `index`."""
+        """Return the points that `index`, of numbers or a mask (n,), selects."""
         return OrientedPoints(self.points[index], self.normals[index], self.polyline[index])
 
 
 def join_points(oriented: list[OrientedPoints]) -> OrientedPoints:
-    """Return all points of `surfaces`, which share a frame."""
+    """Return all points of `oriented`, which share a frame."""
     return OrientedPoints(
         np.concatenate([s.points for s in oriented]),
         np.concatenate([s.normals for s in oriented]),
@@ -68,12 +68,21 @@ def left_normals(directions: FloatArray) -> FloatArray:
 def scan_surface(
     scan: Scan, segments: ScanSegments, polyline: IntArray, max_range: float
 ) -> OrientedPoints:
-    """Return the oriented points of `scan` up to `max_range` [m], sensor frame.
-
-    `polyline` (n,) names the generalized polyline of each of the n segments.
+    """Return the oriented points of a scan, sensor frame.
 
     A return on a segment takes the segment's normal; another, its neighbours'. Returns without
     a neighbour near enough have no direction and are left out.
+
+    Parameters
+    ----------
+    scan
+        One sweep.
+    segments
+        Its n segments.
+    polyline
+        (n,) the generalized polyline of each segment.
+    max_range
+        [m] beyond which returns are left out.
     """
     with np.errstate(invalid="ignore"):
         used = np.flatnonzero(scan.hits & (scan.ranges <= max_range))
@@ -103,8 +112,14 @@ def surface_between(
 
     Parameters
     ----------
+    scan
+        One sweep.
+    segments
+        Its n segments.
     polyline
-        (n,) the generalized polyline of each of the n segments.
+        (n,) the generalized polyline of each segment.
+    max_range
+        [m] beyond which returns are left out.
     spacing
         [m] that two neighbouring points are apart at the most, returns included.
     """
@@ -124,9 +139,19 @@ def surface_between(
 
 
 def points_on_lines(lines: LineMap, spacing: float) -> tuple[OrientedPoints, IntArray]:
-    """Return oriented points about every `spacing` [m] along the segments of `lines`.
+    """Return oriented points along the segments of a map.
 
-    The second value tells which segment each point is on; each has one at least.
+    Parameters
+    ----------
+    lines
+        The map; its frame is that of the points.
+    spacing
+        [m] between points, about; each segment has one at least.
+
+    Returns
+    -------
+    tuple of OrientedPoints and IntArray
+        The points, and (n,) which segment each is on.
     """
     segments = lines.segments
     directions = segments[:, 2:] - segments[:, :2]

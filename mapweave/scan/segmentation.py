@@ -104,7 +104,18 @@ def extract_segments(scan: Scan, parameters: SegmentationParameters | None = Non
 
 
 def fit_segment(points: FloatArray) -> FloatArray:
-    """Return the (4,) total-least-squares segment of (k, 2) `points`, along their order."""
+    """Return the segment that fits points best by total least squares.
+
+    Parameters
+    ----------
+    points
+        (k, 2) [m], k at least 2, in beam order.
+
+    Returns
+    -------
+    FloatArray
+        (4,) x1 y1 x2 y2 [m], directed as the points come.
+    """
     centre, direction = _fit_line(points)
     along = (points - centre) @ direction
     return np.concatenate([centre + along.min() * direction, centre + along.max() * direction])
