@@ -201,6 +201,11 @@ def test_the_readme_is_short() -> None:
     assert len(README.text.splitlines()) <= 150
 
 
+def test_the_quickstart_is_printed_as_it_stands() -> None:
+    code = (ROOT / "examples" / "quickstart.py").read_text(encoding="utf-8")
+    assert code in README.blocks("python")
+
+
 PYTHON_EXAMPLES = [code for page in PAGES for code in page.blocks("python")]
 
 
