@@ -85,15 +85,21 @@ def simplify(
     return meet_walls(join_corners(walls, free, p.joining), free, p.wall_ends)
 
 
-def sources(segments: FloatArray, sightings: FloatArray) -> tuple[IntArray, IntArray]:
+def sources(
+    segments: FloatArray,
+    sightings: FloatArray,
+    parameters: SimplificationParameters | None = None,
+) -> tuple[IntArray, IntArray]:
     """Return pairs of a segment and a sighting of it: most of the one lies along the other.
 
     Parameters
     ----------
     segments, sightings
         (n, 4) and (k, 4) [m], one frame.
+    parameters
+        Those that the segments were simplified with: what was of a segment then is a sighting now.
     """
-    p = SimplificationParameters()
+    p = parameters or SimplificationParameters()
     points, directions, lengths, owner = sample(sightings, 2 * p.spacing)
     near = Nearness.of(segments, points, directions, p.placement.tolerance)
     along = np.flatnonzero(near.cosine >= np.cos(p.placement.parallel))

@@ -144,7 +144,7 @@ class SubmapBuilder:
         sightings, scans = seen.segments[kept], seen.scans[kept]
         once = np.ones(len(kept), dtype=np.int64)
         walls = simplify(merged[left], sightings, once, free, p.simplification)
-        wall, source = sources(walls, sightings)
+        wall, source = sources(walls, sightings, p.simplification)
         found, labels = np.unique(wall, return_inverse=True)
         lines = self._grouped(walls[found], *self._still_there(walls[found], labels, scans[source]))
         return replace(lines, free_space=rings(free))

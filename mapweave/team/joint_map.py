@@ -189,7 +189,7 @@ def _join(
     everything = LineMap.union(placed)
     free = unite([from_rings(everything.free_space)], p.free_space)
     walls = _merged(everything, free, p)
-    wall, source = sources(walls, everything.segments)
+    wall, source = sources(walls, everything.segments, p.simplification)
     support = np.bincount(wall, everything.support[source], minlength=len(walls))
     order, polyline = group_polylines(walls, p.max_gap)
     lines = LineMap(
