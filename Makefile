@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: demo test test-all lint bench bench-map bench-fusion clean
+.PHONY: demo test test-all lint mutations bench bench-map bench-fusion clean
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -27,6 +27,9 @@ test: lint
 
 test-all: lint
 	$(BIN)/pytest -n 2
+
+mutations: $(STAMP)
+	$(BIN)/python -m benchmarks mutations
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks
