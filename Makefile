@@ -11,7 +11,7 @@ SOURCES := pyproject.toml README.md LICENSE \
 TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
 
 .PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
-.PHONY: clean distclean
+.PHONY: clean distclean docs mutations
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -61,6 +61,9 @@ matrix: dist/.built
 durations: .venv-wheel/.installed
 	$(TEST_WHEEL) -q -m 'not slow' --junitxml=.pytest_cache/durations.xml
 	$(BIN)/python -m tools.durations .pytest_cache/durations.xml
+
+mutations: $(STAMP)
+	$(BIN)/python -m benchmarks mutations
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks

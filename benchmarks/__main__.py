@@ -13,6 +13,7 @@ from benchmarks import (
     fusion,
     kidnap,
     mapping,
+    mutations,
     peers,
     reference,
     same_results,
@@ -45,6 +46,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,
+    "mutations": mutations,
 }
 USUAL = ("figure2", "map", "kidnap", "fusion")
 

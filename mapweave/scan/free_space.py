@@ -126,8 +126,9 @@ def _positive_runs(reach: FloatArray) -> list[tuple[int, int]]:
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:
-    """The polygons in `geometry`; stray points and lines have no area and are left out."""
-    return [p for p in shapely.get_parts(geometry, return_index=False) if isinstance(p, Polygon)]
+    """The polygons in `geometry`; what has no area, as stray points and lines, is left out."""
+    parts = shapely.get_parts(geometry)
+    return [p for p in parts if isinstance(p, Polygon) and not p.is_empty]
 
 
 def _without_holes(polygon: Polygon) -> list[Polygon]:

@@ -81,6 +81,13 @@ def test_round_walls_have_no_main_direction() -> None:
     assert len(main_directions(walls(np.arange(0.0, 360.0, 3.0)))) == 0
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_chance_makes_no_main_direction(seed: int) -> None:
+    """300 walls in any direction: the histogram has many peaks, none of them significant."""
+    anywhere = np.random.default_rng(seed).uniform(0, 360, 300)
+    assert len(main_directions(walls(anywhere))) == 0
+
+
 def test_nothing_has_no_main_direction() -> None:
     assert len(main_directions(np.empty((0, 4)))) == 0
 
@@ -119,6 +126,13 @@ def test_drift_makes_no_direction_of_its_own() -> None:
     """Accumulated errors spread a direction; they do not lead to a peak (paper, VI)."""
     drifting = walls(np.concatenate([np.linspace(0, 4, 60), 90 + np.linspace(0, 4, 60)]))
     assert len(main_directions(drifting)) == 2
+
+
+@pytest.mark.parametrize(("beside", "count"), [(5.0, 1), (20.0, 2)])
+def test_a_shoulder_of_a_main_direction_is_none_of_its_own(beside: float, count: int) -> None:
+    """Half the wall, 5° beside: no valley parts the two; 20° beside one does."""
+    turned = np.concatenate([walls(np.array([0.0]), 10.0), walls(np.array([beside]), 5.0)])
+    assert len(main_directions(turned)) == count
 
 
 def test_the_nearest_direction_is_that_of_a_line() -> None:

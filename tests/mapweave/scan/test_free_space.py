@@ -94,6 +94,10 @@ def test_rings_have_no_holes_and_cover_the_same_area() -> None:
     assert shapely.symmetric_difference(from_rings(outlines), square).area < 1e-9
 
 
+def test_what_is_not_free_anywhere_has_no_rings() -> None:
+    assert rings(Polygon()) == rings(from_rings([])) == ()
+
+
 def test_overlapping_rings_are_united_and_slivers_ignored() -> None:
     overlapping = (rectangle(0, 0, 4, 4), rectangle(2, 0, 6, 4), np.array([[0.0, 0.0], [1, 1]]))
     assert from_rings(overlapping).area == pytest.approx(24)
