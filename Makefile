@@ -3,7 +3,15 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: demo test test-all lint bench bench-map bench-fusion clean
+WHEEL_BIN := .venv-wheel/bin
+PACKAGES := mapweave protocol agent fusion_server deploy
+SOURCES := pyproject.toml README.md LICENSE \
+	$(shell find $(PACKAGES) -name __pycache__ -prune -o -print)
+# PYTHONSAFEPATH: programs that tests start import the wheel as well, not the checkout.
+TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
+
+.PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
+.PHONY: clean distclean mutations
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -19,17 +27,51 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/mypy tests
+	$(BIN)/mypy tests tools benchmarks
+	$(BIN)/mypy examples/*.py
 	$(BIN)/lint-imports
 
-test: lint
-	$(BIN)/pytest -n 2 -m 'not slow'
+format: $(STAMP)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
 
-test-all: lint
-	$(BIN)/pytest -n 2
+dist/.built: $(STAMP) $(SOURCES)
+	rm -rf dist
+	$(BIN)/python -m build --quiet
+	@touch $@
+
+wheel: dist/.built
+
+.venv-wheel/.installed: dist/.built
+	$(BIN)/python -m tools.wheel_environment .venv-wheel
+	@touch $@
+
+test: lint .venv-wheel/.installed
+	$(TEST_WHEEL) -m 'not slow'
+
+test-all: lint .venv-wheel/.installed
+	$(TEST_WHEEL)
+
+quick: $(STAMP)
+	$(BIN)/python -m tools.quick $(BASE)
+
+matrix: dist/.built
+	$(BIN)/python -m tools.matrix
+
+durations: .venv-wheel/.installed
+	$(TEST_WHEEL) -q -m 'not slow' --junitxml=.pytest_cache/durations.xml
+	$(BIN)/python -m tools.durations .pytest_cache/durations.xml
+
+mutations: $(STAMP)
+	$(BIN)/python -m benchmarks mutations
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks
+
+.PHONY: docs
+docs: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs/reference site
 
 bench-map: $(STAMP)
 	$(BIN)/python -m benchmarks map
@@ -38,6 +80,11 @@ bench-map: $(STAMP)
 bench-fusion: $(STAMP)
 	$(BIN)/python -m benchmarks fusion
 
+# What was made of the sources; results (demo, team, bench) stay.
 clean:
-	rm -rf .venv demo team bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv .venv-wheel .matrix dist site
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean
+	rm -rf demo team bench

@@ -13,8 +13,10 @@ from benchmarks import (
     fusion,
     kidnap,
     mapping,
+    mutations,
     peers,
     reference,
+    same_results,
     team,
     wire,
 )
@@ -40,9 +42,11 @@ BENCHMARKS: dict[str, Benchmark] = {
     "fusion": fusion,
     "reference": reference,
     "peers": peers,
+    "same-results": same_results,
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,
+    "mutations": mutations,
 }
 USUAL = ("figure2", "map", "kidnap", "fusion")
 

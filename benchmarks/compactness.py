@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.lines.sightings import Nearness, sample, units
+from mapweave.geometry.segments import sample, units
+from mapweave.lines.sightings import Nearness
 
 DOUBLE = (0.03, 0.3)  # [m] between the two of a doubled wall
 PARALLEL = np.deg2rad(15.0)

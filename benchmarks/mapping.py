@@ -1,4 +1,4 @@
-"""One robot: every log mapped without odometry, one table (issue of the single-robot map)."""
+"""One robot: every log mapped without odometry, one table."""
 
 import argparse
 from collections.abc import Sequence

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 from mapweave.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from mapweave.config import Config, Mapping, Robot, Sensor
     from mapweave.errors import MapweaveError
     from mapweave.fusion.align import align
     from mapweave.io.export import export
@@ -35,11 +36,15 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "Alignment": "mapweave.maps",
+    "Config": "mapweave.config",
     "JointMap": "mapweave.maps",
     "Mapper": "mapweave.mapping.mapper",
+    "Mapping": "mapweave.config",
     "MapweaveError": "mapweave.errors",
+    "Robot": "mapweave.config",
     "RobotMap": "mapweave.maps",
     "Scan": "mapweave.scan.scan",
+    "Sensor": "mapweave.config",
     "align": "mapweave.fusion.align",
     "export": "mapweave.io.export",
     "fuse": "mapweave.team.joint_map",
@@ -54,11 +59,15 @@ if not TYPE_CHECKING:  # who checks types knows the names from above
 
 __all__ = [
     "Alignment",
+    "Config",
     "JointMap",
     "Mapper",
+    "Mapping",
     "MapweaveError",
+    "Robot",
     "RobotMap",
     "Scan",
+    "Sensor",
     "align",
     "export",
     "fuse",

@@ -1,18 +1,23 @@
 """The program ``mapweave``: finds subcommands by entry point, runs one, reports errors in a line.
 
 Every installed package may contribute to the entry-point group ``mapweave.commands``; only the
-subcommand asked for is imported.
+subcommand asked for is imported: for the overview the summaries are read from the source, where
+they stand as the first argument of ``command = Command("…", …)``.
 """
 
 import argparse
+import ast
 import math
 import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points, version
+from importlib.metadata import EntryPoint, entry_points, version
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TypeVar
 
+from mapweave.config import Config
 from mapweave.errors import MapweaveError
 
 T = TypeVar("T")
@@ -70,9 +75,30 @@ def not_negative(text: str) -> float:
     return value
 
 
+def add_config_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--config``; read it with `config_of`."""
+    parser.add_argument(
+        "--config",
+        metavar="FILE.toml",
+        type=Path,
+        help="sensor, robot and numbers of mapping; mapweave config shows them",
+    )
+
+
+def config_of(options: argparse.Namespace) -> Config:
+    """Return the configuration that ``--config`` and the environment make of the defaults.
+
+    Raises
+    ------
+    ConfigError
+        If there is something wrong with either.
+    """
+    return Config.load(options.config, os.environ)
+
+
 def _overview(points: Sequence[str]) -> str:
     commands = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
-    lines = [f"  {name:<8} {commands[name].load().summary}" for name in points]
+    lines = [f"  {name:<8} {summary_of(commands[name])}" for name in points]
     return "usage: mapweave COMMAND …\n\n" + "\n".join(
         [
             "Joint line maps of robot teams from raw 2D laser scans.",
@@ -82,6 +108,25 @@ def _overview(points: Sequence[str]) -> str:
             "mapweave COMMAND --help tells more; mapweave --version.",
         ]
     )
+
+
+def summary_of(point: EntryPoint) -> str:
+    """Return the summary of a subcommand, as its source states it; else import it and look.
+
+    Only the packages around its module are imported.
+    """
+    spec = find_spec(point.module)
+    source = Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None
+    if source is not None and source.suffix == ".py":
+        for statement in ast.parse(source.read_bytes()).body:
+            match statement:
+                case ast.Assign(
+                    targets=[ast.Name(id=name)],
+                    value=ast.Call(args=[ast.Constant(value=str(summary)), *_]),
+                ) if name == point.attr:
+                    return summary
+    command: Command = point.load()
+    return command.summary
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -77,3 +77,23 @@ class FinishedError(MapweaveError):
             f"the map of robot {robot!r} is finished and takes no more scans; expected a new Mapper"
         )
         self.robot = robot
+
+
+class ConfigError(MapweaveError):
+    """A configuration that cannot be used.
+
+    Parameters
+    ----------
+    origin
+        The file or the variable that says so; empty where a program does.
+    field
+        Such as ``sensor.range_sigma``; empty where it is the file as a whole.
+    problem
+        What is wrong with it, and what was expected.
+    """
+
+    def __init__(self, origin: str, field: str, problem: str) -> None:
+        super().__init__(": ".join(part for part in (origin, field, problem) if part))
+        self.origin = origin
+        self.field = field
+        self.problem = problem

@@ -6,10 +6,12 @@ Words and formats: a *segment* is directed, its visible side on the left of its 
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from typing import Literal
 
 import numpy as np
 
+from mapweave.config import Config
 from mapweave.errors import InvalidComponentError
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry import se2
@@ -18,6 +20,27 @@ from mapweave.reasons import Reason, Status
 from mapweave.text import tell_reason
 
 Decision = Literal["accepted", "ambiguous", "refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class MadeWith:
+    """What a map was made with.
+
+    Attributes
+    ----------
+    program
+        Its name and version, such as ``mapweave 0.1.0``.
+    config
+        The effective configuration, section by section: plain values, as the program had them.
+    """
+
+    program: str
+    config: Mapping[str, Mapping[str, object]]
+
+    @classmethod
+    def of(cls, config: Config) -> "MadeWith":
+        """Return what tells of this program under `config`."""
+        return cls(f"mapweave {version('mapweave')}", config.values())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,12 +175,15 @@ class RobotMap:
         Grows with every change.
     submaps
         Ids ascending.
+    made_with
+        The program and its configuration; None where it is not known, as in maps from the network.
     """
 
     robot: str
     boot: str
     version: int
     submaps: tuple[Submap, ...]
+    made_with: MadeWith | None = None
 
     @property
     def components(self) -> list[int]:
@@ -233,11 +259,15 @@ class JointComponent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointMap:
-    """What the team knows, as a numbered immutable version."""
+    """What the team knows, as a numbered immutable version.
+
+    `made_with` is None where it is not known, as in maps from the network.
+    """
 
     version: int
     components: tuple[JointComponent, ...]
     alignments: tuple[Alignment, ...]
+    made_with: MadeWith | None = None
 
 
 def component_name(robot: str, component: int) -> str:

@@ -4,6 +4,10 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("busy", deadline=None)  # on a busy machine an example may take its time
+settings.load_profile("busy")
 
 DATA = Path(os.environ.get("MAPWEAVE_DATA", Path(__file__).parents[2] / "shared" / "data"))
 

@@ -3,10 +3,11 @@
 import argparse
 import logging
 import sys
+from functools import partial
 from pathlib import Path
 
-from mapweave.cli import Command, argument, positive
-from mapweave.fusion.align import align
+from mapweave.cli import Command, add_config_argument, argument, config_of, positive
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
 from mapweave.io.scan_range import ScanRange
 from mapweave.mapping.mapper import Mapper, MapperParameters
@@ -48,6 +49,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="least time between two messages of the growing submap [s] (default %(default)g)",
     )
     add_connection_arguments(parser)
+    add_config_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -56,20 +58,22 @@ def _run(options: argparse.Namespace) -> int:
     )
     robot = check_id("robot", options.robot)
     team, endpoints = connection_of(options)
+    config = config_of(options)
     clock = ReplayClock(options.rate)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
-    source = LogSource.open(options.log, options.scans, _log.warning)
+    source = LogSource.open(options.log, options.scans, _log.warning, config.sensor.angular_step)
 
     def tell_waiting() -> None:
         _log.info("waiting for a router at %s", ", ".join(endpoints))
 
-    mapping = MapperParameters()
+    mapping = MapperParameters.of(config)
+    compare = partial(align, parameters=FusionParameters.of(config))
     with (
-        ComparisonWorker(align) as comparer,
+        ComparisonWorker(compare) as comparer,
         BackendProcess(mapping.backend) as backend,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        mapper = Mapper(robot, new_boot(), mapping, backend)
+        mapper = Mapper(robot, new_boot(), mapping, backend, config)
         parameters = AgentParameters(map_interval=options.map_interval)
         agent = Agent(session, team, mapper, comparer, source.total, parameters)
         agent.run(source.scans(), clock, stop_on_signal())

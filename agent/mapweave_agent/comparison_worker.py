@@ -46,7 +46,8 @@ class ComparisonWorker(Worker):
     Parameters
     ----------
     align
-        Aligns all pairs of components of two maps; a function at the top of a module.
+        Aligns all pairs of components of two maps; a function at the top of a module, or a
+        `functools.partial` of one.
     """
 
     def __init__(self, align: Aligner) -> None:

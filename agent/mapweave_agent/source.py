@@ -42,15 +42,22 @@ class LogSource:
     ----------
     total
         How many scans are selected.
+    angular_step
+        Between beams [rad], where the log does not state it; None has their number tell.
     """
 
     path: Path
     selected: ScanRange
     total: int
+    angular_step: float | None = None
 
     @classmethod
     def open(
-        cls, path: Path, selected: ScanRange, on_warning: Callable[[str], None]
+        cls,
+        path: Path,
+        selected: ScanRange,
+        on_warning: Callable[[str], None],
+        angular_step: float | None = None,
     ) -> "LogSource":
         """Read the log through once, so that what is wrong with it is said before all else.
 
@@ -59,15 +66,18 @@ class LogSource:
         FileError
             If it holds no usable scan, or none that is selected.
         """
-        scans = sum(1 for _ in read_scans(path, on_warning=on_warning))
+        read = read_scans(path, angular_step=angular_step, on_warning=on_warning)
+        scans = sum(1 for _ in read)
         total = selected.count(scans)
         if total == 0:
             raise FileError(path, f"has {scans} scans, none of them in {selected}")
-        return cls(path, selected, total)
+        return cls(path, selected, total, angular_step)
 
     def scans(self) -> Iterator[Scan]:
         """Yield the selected scans, without odometry."""
-        return self.selected.of(read_scans(self.path, on_warning=_already_warned))
+        step = self.angular_step
+        scans = read_scans(self.path, angular_step=step, on_warning=_already_warned)
+        return self.selected.of(scans)
 
 
 def _already_warned(_: str) -> None:

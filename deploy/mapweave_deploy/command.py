@@ -5,16 +5,17 @@ import signal
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 from rich.text import Text
 
-from mapweave.cli import Command
+from mapweave.cli import Command, config_of
 from mapweave.errors import FileError
 from mapweave.ids import check_id
 from mapweave.io.map_files import write_joint
+from mapweave.maps import MadeWith
 from mapweave.pictures.picture import draw_joint
 from mapweave_deploy.run.display import open_display
 from mapweave_deploy.run.launcher import Plan, TeamOutcome, free_endpoint, run_team, start_server
@@ -78,6 +79,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the team; write and tell what it came to."""
     check_source(options)
     check_id("team", options.team)
+    config = config_of(options)
     # Whoever terminates a team means all of it, as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     console = Console()
@@ -91,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
         with open_display(console, plan.members) as display:
             outcome = run_team(crew, plan, display)
         store = _keep_store(plan.store, options.store or folder.store)
-        _write(outcome, folder)
+        _write(outcome, MadeWith.of(config), folder)
         _say(console, tell_outcome(outcome, plan.members))
         files = [("picture", folder.picture), ("joint map", folder.joint), ("store", store)]
         _say(console, tell_files([*files, ("what each process said", folder.logs)]))
@@ -110,6 +112,7 @@ def _plan(options: argparse.Namespace, folder: Folder, store: Path) -> Plan:
         listen=options.listen or free_endpoint(),
         store=store,
         timeout=options.timeout,
+        config=options.config,
     )
 
 
@@ -141,8 +144,8 @@ def _keep_store(written: Path, final: Path) -> Path:
     return final
 
 
-def _write(outcome: TeamOutcome, folder: Folder) -> None:
-    write_joint(folder.joint, outcome.joint)
+def _write(outcome: TeamOutcome, made_with: MadeWith, folder: Folder) -> None:
+    write_joint(folder.joint, replace(outcome.joint, made_with=made_with))
     draw_joint(outcome.joint, folder.picture, outcome.maps)
 
 

@@ -5,8 +5,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from types import TracebackType
 
+from mapweave.config import Config
 from mapweave.maps import JointMap
-from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.joint_map import JointParameters
+from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 from mapweave_fusion_server.coordinator import Draft
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import JointMapMessage
@@ -43,11 +45,15 @@ class VersionBuilder:
     ----------
     series
         Names the numbering, for the message.
+    config
+        The effective configuration.
     """
 
-    def __init__(self, series: str) -> None:
+    def __init__(self, series: str, config: Config) -> None:
         self._series = series
-        self._weaver = JointOptimizer()  # the worker's alone
+        self._parameters = JointParameters.of(config)
+        # The worker's alone.
+        self._weaver = JointOptimizer(JointOptimizationParameters.of(config))
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
         self._future: Future[Built] | None = None
 
@@ -92,5 +98,5 @@ class VersionBuilder:
         return future.result()
 
     def _build(self, draft: Draft, begun: float) -> Built:
-        joint = draft.build(self._weaver)
+        joint = draft.build(self._weaver, self._parameters)
         return Built(draft, begun, joint, encode(JointMapMessage.pack(joint, self._series)))

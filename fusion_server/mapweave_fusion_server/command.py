@@ -5,7 +5,7 @@ import logging
 import sys
 from pathlib import Path
 
-from mapweave.cli import Command, argument, not_negative
+from mapweave.cli import Command, add_config_argument, argument, config_of, not_negative
 from mapweave_fusion_server.coordinator import CoordinatorParameters
 from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
@@ -20,6 +20,7 @@ _log = logging.getLogger(__name__)
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     add_connection_arguments(parser)
+    add_config_argument(parser)
     parser.add_argument(
         "--store",
         type=Path,
@@ -41,6 +42,7 @@ def _run(options: argparse.Namespace) -> int:
         stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S"
     )
     team, endpoints = connection_of(options)
+    config = config_of(options)
     parameters = CoordinatorParameters(min_interval=options.min_interval)
     path = options.store or Path(f"mapweave-{team}.sqlite")
 
@@ -51,7 +53,7 @@ def _run(options: argparse.Namespace) -> int:
         Store(path, team) as store,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        Service(session, team, store, parameters).run(stop_on_signal())
+        Service(session, team, store, parameters, config).run(stop_on_signal())
     return 0
 
 

@@ -12,7 +12,7 @@ from typing import TypeAlias
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name, parse_component
-from mapweave.team.joint_map import build_team_map
+from mapweave.team.joint_map import JointParameters, build_team_map
 from mapweave.team.joint_optimization import JointOptimizer
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
 from mapweave.team.revocation import mark_revoked
@@ -62,15 +62,17 @@ class Draft:
     alignments: tuple[Alignment, ...]
     before: tuple[Alignment, ...] = ()
 
-    def build(self, weaver: JointOptimizer) -> JointMap:
+    def build(self, weaver: JointOptimizer, parameters: JointParameters | None = None) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
 
         Parameters
         ----------
         weaver
             Remembers, from one version to the next, which submaps fit.
+        parameters
+            Of how maps become one.
         """
-        joint = build_team_map(self.maps, self.alignments, self.version, weaver)
+        joint = build_team_map(self.maps, self.alignments, self.version, weaver, parameters)
         return mark_revoked(joint, self.before)
 
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 
 import zenoh
 
+from mapweave.config import Config
 from mapweave.errors import MapweaveError
 from mapweave_fusion_server.answers import answer
 from mapweave_fusion_server.builder import VersionBuilder
@@ -41,6 +42,8 @@ class Service:
         What is remembered; numbering goes on from there.
     parameters
         Of the coordinator.
+    config
+        Of how maps become one; the default one where none is given.
 
     Raises
     ------
@@ -54,6 +57,7 @@ class Service:
         team: str,
         store: Store,
         parameters: CoordinatorParameters,
+        config: Config | None = None,
     ) -> None:
         self._session = zenoh_session
         self._team = team
@@ -63,7 +67,7 @@ class Service:
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
-        self._builder = VersionBuilder(store.series)
+        self._builder = VersionBuilder(store.series, config or Config())
 
     def run(self, stopping: Callable[[], bool]) -> None:
         """Serve until `stopping`; then publish what is pending.

@@ -5,10 +5,11 @@ from itertools import combinations
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
-from mapweave.cli import Command
+from mapweave.cli import Command, add_config_argument, config_of
 from mapweave.commands.progress import track
+from mapweave.config import Config
 from mapweave.errors import FileError
-from mapweave.fusion.align import align
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.io.map_files import read_map, save
 from mapweave.maps import Alignment, JointMap, RobotMap, parse_component
 from mapweave.pictures.picture import check_picture_suffix, plot
@@ -23,17 +24,17 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("others", metavar="MAP.json", type=Path, nargs="+", help="other robots'")
     parser.add_argument("--output", metavar="JOINT.json", type=Path, help="the joint map to write")
     parser.add_argument("--plot", metavar="JOINT.png", type=Path, help="the picture (png, svg)")
+    add_config_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
+    config = config_of(options)
     if options.plot:
         check_picture_suffix(options.plot)
     inputs = [options.first, *options.others]
     check_outputs([options.output, options.plot], inputs)
     maps = _read_distinct(inputs)
-    pairs = list(combinations(maps.values(), 2))
-    alignments = [a for first, second in track(pairs, "comparing") for a in align(first, second)]
-    joint = fuse(list(maps.values()), alignments)
+    joint = fuse(list(maps.values()), _compared(list(maps.values()), config), config)
     if options.output:
         save(joint, options.output)
     if options.plot:
@@ -55,6 +56,12 @@ def _read_distinct(paths: list[Path]) -> dict[str, RobotMap]:
             )
         maps[robot_map.robot] = robot_map
     return maps
+
+
+def _compared(maps: list[RobotMap], config: Config) -> list[Alignment]:
+    """Compare all pairs of `maps`."""
+    pairs, parameters = list(combinations(maps, 2)), FusionParameters.of(config)
+    return [a for one, other in track(pairs, "comparing") for a in align(one, other, parameters)]
 
 
 def tell(joint: JointMap) -> list[str]:

@@ -5,8 +5,9 @@ import sys
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
-from mapweave.cli import Command, argument
+from mapweave.cli import Command, add_config_argument, argument, config_of
 from mapweave.commands.progress import track
+from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave.ids import check_id
 from mapweave.io.map_files import save
@@ -37,16 +38,16 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plot", metavar="MAP.png", type=Path, help="the picture to write (png, svg)"
     )
+    add_config_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
     check_id("robot", options.robot)
+    config = config_of(options)
     if options.plot:
         check_picture_suffix(options.plot)
     check_outputs([options.output, options.plot], [options.log])
-    robot_map, taken = _map_log(
-        options.log, options.robot, options.scans, odometry=options.odometry == "prior"
-    )
+    robot_map, taken = _map_log(options, config)
     if options.output:
         save(robot_map, options.output)
     if options.plot:
@@ -55,12 +56,14 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _map_log(log: Path, robot: str, chosen: ScanRange, *, odometry: bool) -> tuple[RobotMap, int]:
+def _map_log(options: argparse.Namespace, config: Config) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
-    mapper = Mapper(robot)
-    total = chosen.count(count_scans(log)) if sys.stderr.isatty() else None
+    mapper = Mapper(options.robot, config=config)
+    log, chosen, step = options.log, options.scans, config.sensor.angular_step
+    total = chosen.count(count_scans(log, step)) if sys.stderr.isatty() else None
     taken = 0
-    scans = chosen.of(read_scans(log, odometry=odometry, on_warning=_warn))
+    prior = options.odometry == "prior"
+    scans = chosen.of(read_scans(log, odometry=prior, angular_step=step, on_warning=_warn))
     for scan in track(scans, f"mapping {log.name}", total):
         mapper.add(scan)
         taken += 1

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.fusion.confidence import ConfidenceParameters, confidence
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
@@ -20,30 +20,36 @@ from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
 from mapweave.fusion.parts import PartParameters, agreed, cut
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.maps import Alignment, LineMap, RobotMap, component_name
 from mapweave.matching.distance_field import DistanceFieldParameters
 from mapweave.matching.hypotheses import HypothesisParameters, PreparedMap, different, hypothesise
 from mapweave.matching.icp import IcpParameters, Target, align_all
 from mapweave.matching.verification import VerificationParameters, shared_complexity, verify
+from mapweave.parameters import StageParameters, derived
 from mapweave.reasons import Reason, ReasonKind
 
 
-class FusionParameters(BaseModel):
+class FusionParameters(StageParameters):
     """One model for each stage."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    raster: DistanceFieldParameters = DistanceFieldParameters()
-    hypotheses: HypothesisParameters = HypothesisParameters()
+    raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)
+    hypotheses: HypothesisParameters = derived(HypothesisParameters.of)
     # Right transforms contradict next to nothing, wrong ones a metre in ten: at a weight of 5 the
     # right one scored highest for every pair of stretches with 10 m and more in common.
-    verification: VerificationParameters = VerificationParameters(contradiction_weight=5.0)
-    icp: IcpParameters = IcpParameters(start_scale=0.25, end_scale=0.1, shrink=0.6)
+    verification: VerificationParameters = derived(
+        lambda c: VerificationParameters.of(c, contradiction_weight=5.0)
+    )
+    icp: IcpParameters = derived(
+        lambda c: IcpParameters.of(
+            c, start_scale=0.25, end_scale=5 * c.sensor.range_sigma, shrink=0.6
+        )
+    )
     icp_samples: int = Field(250, ge=10, description="of a map's walls, aligning hypotheses")
     loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
     confidence: ConfidenceParameters = ConfidenceParameters()
-    parts: PartParameters = PartParameters()
-    decision: DecisionParameters = DecisionParameters()
+    parts: PartParameters = derived(PartParameters.of)
+    decision: DecisionParameters = derived(DecisionParameters.of)
     reach: ExtrapolationParameters = ExtrapolationParameters()
     min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
 
@@ -146,7 +152,7 @@ def align_maps(
 
 def prepare(lines: LineMap, p: FusionParameters) -> PreparedMap | None:
     """Return what comparing `lines` takes; None where there is too little wall to compare."""
-    wall = np.hypot(*(lines.segments[:, 2:] - lines.segments[:, :2]).T).sum()
+    wall = lengths(lines.segments).sum()
     return PreparedMap.of(lines, p.hypotheses, p.raster) if wall >= p.min_wall else None
 
 

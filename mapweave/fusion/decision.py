@@ -8,23 +8,22 @@ hypothesis far behind. Each condition that fails is the reason given.
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Decision
 from mapweave.matching.verification import Verdict
+from mapweave.parameters import StageParameters, derived
 from mapweave.reasons import Reason, ReasonKind
 
 
-class DecisionParameters(BaseModel):
+class DecisionParameters(StageParameters):
     """What an alignment must show to be accepted.
 
     The limits were set on stretches of the Intel, CSAIL and Seattle logs.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     min_common: float = Field(6.0, gt=0, description="[m] of wall in common")
     min_overlap: float = Field(
@@ -47,7 +46,9 @@ class DecisionParameters(BaseModel):
         description="[m] held from which straight walls do: those across each other are a shape as"
         " well, though doors and gaps keep them apart",
     )
-    min_confidence: float = Field(0.85, gt=0, lt=1, description="of an accepted alignment")
+    min_confidence: float = derived(
+        lambda c: c.mapping.min_confidence, gt=0, lt=1, description="of an accepted alignment"
+    )
     max_rival: float = Field(
         0.5, gt=0, lt=1, description="score of the best different hypothesis, as a share"
     )

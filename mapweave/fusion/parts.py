@@ -10,20 +10,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap, RobotMap
+from mapweave.parameters import StageParameters, derived
 from mapweave.reasons import Reason, ReasonKind
 
 
-class PartParameters(BaseModel):
+class PartParameters(StageParameters):
     """How maps are cut, and when parts agree."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    length: float = Field(36.0, gt=0, description="[m] of path that is rigid: three submaps")
+    length: float = derived(
+        lambda c: 3 * c.mapping.submap_length,
+        gt=0,
+        description="[m] of path that is rigid: three submaps",
+    )
     count: int = Field(4, ge=1, description="parts at most; of a longer path they are longer")
     distance: float = Field(1.0, gt=0, description="[m] by which two parts' alignments may differ")
     turn: float = Field(0.09, gt=0, description="[rad] by which they may differ: 5°")

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap
 from mapweave.shape.partial_match import best_match
 from mapweave.shape.stretch import stretch_of
@@ -250,10 +251,10 @@ def _distance(points: FloatArray, segments: FloatArray) -> FloatArray:
 
 def _centroid(polyline: FloatArray) -> FloatArray:
     """(2,) mean of all points of a polyline by arc length [m]."""
-    lengths = np.hypot(*(polyline[:, 2:] - polyline[:, :2]).T)
+    weight = lengths(polyline)
     middles = (polyline[:, :2] + polyline[:, 2:]) / 2
-    return np.asarray(lengths @ middles / lengths.sum())
+    return np.asarray(weight @ middles / weight.sum())
 
 
 def _length(polyline: FloatArray) -> float:
-    return float(np.hypot(*(polyline[:, 2:] - polyline[:, :2]).T).sum())
+    return float(lengths(polyline).sum())

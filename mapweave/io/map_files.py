@@ -7,6 +7,7 @@ import json
 import math
 import reprlib
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,7 +21,16 @@ from mapweave.evidence import RunnerUp
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.io.map_schema import JOINT_FORMAT, MAP_FORMAT, HeaderFile, JointFile, MapFile
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
-from mapweave.maps import Alignment, JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
+from mapweave.maps import (
+    Alignment,
+    JointComponent,
+    JointMap,
+    LineMap,
+    MadeWith,
+    RobotMap,
+    Submap,
+    Trajectory,
+)
 from mapweave.reasons import Reason, Status
 
 _EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
@@ -58,6 +68,11 @@ def read_joint(path: str | Path) -> JointMap:
 def load(path: str | Path) -> RobotMap | JointMap:
     """Return the robot map or joint map in the file at `path`, whichever its format says.
 
+    Parameters
+    ----------
+    path
+        ``MAP.json`` or ``JOINT.json``, which may be gzipped; its content tells, not its name.
+
     Raises
     ------
     FileError
@@ -72,6 +87,13 @@ def load(path: str | Path) -> RobotMap | JointMap:
 
 def save(some_map: RobotMap | JointMap, path: str | Path) -> None:
     """Write a robot's map or a joint map to `path`, as `load` reads it; whole or not at all.
+
+    Parameters
+    ----------
+    some_map
+        The map.
+    path
+        The file: ``MAP.json`` or ``JOINT.json``, its numbers rounded to 0.1 mm and 1 µrad.
 
     Raises
     ------
@@ -97,6 +119,7 @@ def write_map(path: str | Path, robot_map: RobotMap) -> None:
         "robot": robot_map.robot,
         "boot": robot_map.boot,
         "version": robot_map.version,
+        **_made_with(robot_map.made_with),
         "submaps": [_submap(submap) for submap in robot_map.submaps],
     }
     _write(path, content)
@@ -113,6 +136,7 @@ def write_joint(path: str | Path, joint: JointMap) -> None:
     content = {
         "format": JOINT_FORMAT,
         "version": joint.version,
+        **_made_with(joint.made_with),
         "alignments": [_alignment(alignment) for alignment in joint.alignments],
         "components": [_component(component) for component in joint.components],
     }
@@ -163,6 +187,11 @@ def _write(path: str | Path, content: object) -> None:
     with replace_file(path) as temporary:
         text = json.dumps(content, separators=(",", ":"), allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _made_with(made_with: MadeWith | None) -> dict[str, object]:
+    """Return the field, where it is known: all digits of a configuration count."""
+    return {} if made_with is None else {"made_with": asdict(made_with)}
 
 
 def _submap(submap: Submap) -> dict[str, object]:

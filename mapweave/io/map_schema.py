@@ -27,6 +27,7 @@ from mapweave.maps import (
     JointComponent,
     JointMap,
     LineMap,
+    MadeWith,
     RobotMap,
     Submap,
     Trajectory,
@@ -137,6 +138,17 @@ class SubmapFile(_LinesFile):
         return np.array(self.uncertainty, dtype=np.float64).reshape(-1, 4)
 
 
+class MadeWithFile(_Model):
+    """What a map was made with; the settings are those of the version that made it."""
+
+    program: str
+    config: dict[str, dict[str, int | float | str | bool | None]]
+
+    def to_made_with(self) -> MadeWith:
+        """Return it as the library's value."""
+        return MadeWith(self.program, self.config)
+
+
 class MapFile(_Model):
     """A whole ``MAP.json``."""
 
@@ -144,6 +156,7 @@ class MapFile(_Model):
     robot: _RobotId
     boot: str
     version: _Count
+    made_with: MadeWithFile | None = None
     submaps: list[SubmapFile]
 
     @model_validator(mode="after")
@@ -156,7 +169,7 @@ class MapFile(_Model):
     def to_map(self) -> RobotMap:
         """Return it as the library's value."""
         submaps = tuple(submap.to_submap() for submap in self.submaps)
-        return RobotMap(self.robot, self.boot, self.version, submaps)
+        return RobotMap(self.robot, self.boot, self.version, submaps, _known(self.made_with))
 
 
 class EvidenceFile(_Model):
@@ -291,6 +304,7 @@ class JointFile(_Model):
 
     format: _JointFormat
     version: _Count
+    made_with: MadeWithFile | None = None
     alignments: list[AlignmentFile]
     components: list[ComponentFile]
 
@@ -300,7 +314,12 @@ class JointFile(_Model):
             version=self.version,
             components=tuple(component.to_component() for component in self.components),
             alignments=tuple(alignment.to_alignment() for alignment in self.alignments),
+            made_with=_known(self.made_with),
         )
+
+
+def _known(made_with: MadeWithFile | None) -> MadeWith | None:
+    return None if made_with is None else made_with.to_made_with()
 
 
 def _check_nesting(

@@ -355,7 +355,9 @@ class PointMap {
       const double d = squared(*guess, x, y, u, v);
       if (d < best) best = d, found = guess;
     }
-    for (int64_t r = 0;; ++r) {
+    const int64_t farthest = std::max(std::max(i - left_, left_ + columns_ - 1 - i),
+                                      std::max(j - low_, low_ + rows_ - 1 - j));
+    for (int64_t r = 0; r <= farthest; ++r) {
       const double gap = r == 0 ? 0.0 : inner + (r - 1) * cell_;  // nothing in this ring is nearer
       if (gap * gap > best || (r > 0 && gap >= reach)) break;
       ring(i, j, r, [&](const std::vector<Point>& here) {
@@ -370,8 +372,9 @@ class PointMap {
 
   bool any_within(double x, double y, double u, double v, double reach) const {
     const double limit = reach * reach;
-    const int64_t i0 = std::max(index(x - reach), left_), i1 = std::min(index(x + reach), left_ + columns_ - 1);
-    const int64_t j0 = std::max(index(y - reach), low_), j1 = std::min(index(y + reach), low_ + rows_ - 1);
+    const int64_t cells = static_cast<int64_t>(std::min(std::ceil(reach / cell_), 1e9));
+    const int64_t i0 = std::max(index(x) - cells, left_), i1 = std::min(index(x) + cells, left_ + columns_ - 1);
+    const int64_t j0 = std::max(index(y) - cells, low_), j1 = std::min(index(y) + cells, low_ + rows_ - 1);
     for (int64_t i = i0; i <= i1; ++i)
       for (int64_t j = j0; j <= j1; ++j)
         for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)])

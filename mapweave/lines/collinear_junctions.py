@@ -5,26 +5,31 @@ wall goes on; it is drawn through unless space that was seen through tells that 
 """
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.lines.corner_junctions import cross, length_inside, neighbours
-from mapweave.lines.sightings import units
+from mapweave.geometry.segments import cross, units
+from mapweave.lines.corner_junctions import length_inside, neighbours
+from mapweave.parameters import StageParameters, derived
 
 
-class StraighteningParameters(BaseModel):
+class StraighteningParameters(StageParameters):
     """Which pieces are of one wall."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    max_bend: float = Field(
-        0.04, ge=0, description="[m] from the chord within which two walls are one (laser noise)"
+    max_bend: float = derived(
+        lambda c: 2 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] from the chord within which two walls are one (laser noise)",
     )
     max_bridge: float = Field(
         0.6, ge=0, description="[m] of wall unseen, and not seen through, between parts of one"
     )
-    max_crossing: float = Field(0.1, ge=0, description="[m] of free space that noise may explain")
+    max_crossing: float = derived(
+        lambda c: 5 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] of free space that noise may explain",
+    )
 
 
 def straighten(
@@ -34,6 +39,15 @@ def straighten(
 
     Always the pair that deviates least from its chord next, as Douglas and Peucker would keep
     the point that deviates most.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    free
+        What was seen through, the same frame [m]: no gap is bridged there.
+    parameters
+        Which pieces are of one wall.
     """
     walls = segments
     while True:

@@ -11,28 +11,37 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
-from mapweave.lines.sightings import units
+from mapweave.geometry.segments import cross, units
+from mapweave.parameters import StageParameters, derived
 
 
-class JoiningParameters(BaseModel):
+class JoiningParameters(StageParameters):
     """Which ends meet."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     reach: float = Field(0.5, gt=0, description="[m] between ends that may meet")
     max_extension: float = Field(0.3, ge=0, description="[m] by which a wall may grow to meet")
-    max_overhang: float = Field(
-        0.12, ge=0, description="[m] that an end may stand out of the other wall to be cut off"
+    max_overhang: float = derived(
+        lambda c: 6 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] that an end may stand out of the other wall to be cut off",
     )
     min_angle: float = Field(
         np.deg2rad(3.0), gt=0, description="[rad] below it lines cross anywhere: ends meet halfway"
     )
-    max_shift: float = Field(0.03, ge=0, description="[m] by which an end may move sideways")
-    max_crossing: float = Field(0.1, ge=0, description="[m] of free space that noise may explain")
+    max_shift: float = derived(
+        lambda c: 1.5 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] by which an end may move sideways",
+    )
+    max_crossing: float = derived(
+        lambda c: 5 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] of free space that noise may explain",
+    )
     min_length: float = Field(0.1, gt=0, description="[m] below which no wall is cut")
 
 
@@ -51,7 +60,14 @@ def join_corners(
 ) -> FloatArray:
     """Return (n, 4) `segments` [m] with ends that meet where they nearly did.
 
-    `free` is what was seen through, the same frame: no wall grows into it.
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    free
+        What was seen through, the same frame [m]: no wall grows into it.
+    parameters
+        Which ends meet.
     """
     found = _meetings(segments, parameters)
     open_ = _is_open(segments, found, free, parameters.max_crossing)
@@ -102,7 +118,20 @@ def _is_open(
 
 
 def length_inside(paths: FloatArray, free: BaseGeometry) -> FloatArray:
-    """Return (k,) how much of (k, j, 2) paths lies in `free` [m]."""
+    """Return how much of each path lies in `free`.
+
+    Parameters
+    ----------
+    paths
+        (k, j, 2) the vertices of k paths [m].
+    free
+        An area, the same frame [m].
+
+    Returns
+    -------
+    FloatArray
+        (k,) [m].
+    """
     if not len(paths):
         return np.empty(0)
     return np.asarray(shapely.length(shapely.intersection(shapely.linestrings(paths), free)))
@@ -123,15 +152,23 @@ def _cheapest(found: _Meetings, allowed: IntArray) -> IntArray:
 
 
 def neighbours(segments: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Return pairs of segments, the end of the one within `reach` [m] of the other's start."""
+    """Return pairs of segments, the end of the one close to the start of the other.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m].
+    reach
+        [m] from the end to the start at most.
+
+    Returns
+    -------
+    tuple of IntArray
+        (k,) the segment that ends there, and (k,) that which starts.
+    """
     if not len(segments):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     ends, starts = scipy.spatial.KDTree(segments[:, 2:]), scipy.spatial.KDTree(segments[:, :2])
     near = ends.sparse_distance_matrix(starts, reach, output_type="ndarray")
     a, b = near["i"].astype(np.int64), near["j"].astype(np.int64)
     return a[a != b], b[a != b]
-
-
-def cross(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return (k,) cross products of (k, 2) vectors."""
-    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])

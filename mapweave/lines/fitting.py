@@ -7,21 +7,23 @@ wall that is bent, or was seen twice at different places.
 
 import numpy as np
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.segments import units
 from mapweave.lines.directions import line_difference, nearest_direction
-from mapweave.lines.sightings import Nearness, Sightings, units
+from mapweave.lines.sightings import Nearness, Sightings
+from mapweave.parameters import StageParameters, derived
 
 
-class FittingParameters(BaseModel):
+class FittingParameters(StageParameters):
     """What belongs to a segment, and where it ends."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    tolerance: float = Field(
-        0.09, gt=0, description="[m] to either side, what is of the segment's surface"
+    tolerance: float = derived(
+        lambda c: 4.5 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] to either side, what is of the segment's surface",
     )
     shadow: float = Field(0.3, gt=0, description="[m] to either side, where it might be instead")
     parallel: float = Field(
@@ -29,8 +31,10 @@ class FittingParameters(BaseModel):
     )
     reach: float = Field(0.3, ge=0, description="[m] beyond its ends, what a fit may take up")
     station: float = Field(0.1, gt=0, description="[m] of a segment that is kept or cut as one")
-    max_hole: float = Field(
-        0.3, ge=0, description="[m] without evidence that a segment bridges; half a narrow door"
+    max_hole: float = derived(
+        lambda c: 0.5 * c.mapping.door,
+        ge=0,
+        description="[m] without evidence that a segment bridges; half a narrow door",
     )
     rounds: int = Field(1, ge=0, description="of fitting")
     opening_depth: float = Field(
@@ -46,7 +50,22 @@ class FittingParameters(BaseModel):
 
 
 def fit(segments: FloatArray, evidence: Sightings, parameters: FittingParameters) -> FloatArray:
-    """Return (n, 4) `segments` [m] where the evidence about them is, by least squares across."""
+    """Return `segments` where the evidence about them is, by least squares across.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    evidence
+        What was seen, the same frame.
+    parameters
+        What of it belongs to a segment.
+
+    Returns
+    -------
+    FloatArray
+        (n, 4) [m], in the order given; one without evidence stays where it was.
+    """
     for _ in range(parameters.rounds):
         segments = _fit_once(segments, evidence, parameters)
     return segments
@@ -57,8 +76,18 @@ def follow(
 ) -> FloatArray:
     """Return (n, 4) `segments` [m] turned about their middle to the main direction (paper, VI-A).
 
-    Only to one of the (k,) `directions` [rad] within `tolerance` [rad], and only where that moves
-    the ends by `max_shift` [m] at most: an oblique wall stays oblique.
+    An oblique wall stays oblique.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m].
+    directions
+        (k,) the main directions [rad], modulo pi.
+    tolerance
+        [rad] by which a segment may be turned.
+    max_shift
+        [m] by which that may move its ends.
     """
     ahead, lengths = units(segments)
     angle = np.arctan2(ahead[:, 1], ahead[:, 0])
@@ -75,7 +104,16 @@ def cut(
 ) -> FloatArray:
     """Return (m, 4) the parts of `segments` [m] on which more evidence lies than close beside.
 
-    In what was seen through, `free`, little evidence is none: there is an open door.
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    evidence
+        What was seen, the same frame.
+    free
+        What was seen through [m]; there little evidence is none: an open door.
+    parameters
+        What belongs to a segment, and where it ends.
     """
     p = parameters
     near = Nearness.of(segments, evidence.points, evidence.directions, p.shadow)
@@ -103,8 +141,19 @@ def trim(
 ) -> FloatArray:
     """Return (n, 4) `segments` [m] without the ends on which nothing lies that is theirs alone.
 
-    What several settle is the first one's. `explains` and `settles` (k,) tell which pairs are of
-    a segment and what it explains, or what it leaves nothing to explain of.
+    What several settle is the first one's.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m].
+    near
+        k pairs of these segments and samples of the evidence.
+    explains, settles
+        (k,) which pairs are of a segment and what it explains, or what it leaves nothing to
+        explain of.
+    evidence
+        What was seen, the same frame.
     """
     first = np.full(len(evidence), len(segments))
     np.minimum.at(first, near.sample[settles], near.segment[settles])

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.segments import lengths
 from mapweave.lines.merging_cost import Pairs
 from mapweave.lines.merging_rules import MergingParameters, Pairing
 from mapweave.lines.segment_index import SegmentIndex
@@ -65,7 +66,7 @@ def evolve(
     Evolution
         The segments that remain, in the order of their making.
     """
-    mass = _lengths(segments) if weights is None else weights
+    mass = lengths(segments) if weights is None else weights
     chosen = parameters or MergingParameters()
     return _simplify(segments, mass, 0, Pairing(segments, mass, chosen))
 
@@ -95,7 +96,7 @@ def merge_scan(
     """
     chosen = parameters or MergingParameters()
     everything = np.concatenate([segments, scan_segments])
-    mass = np.concatenate([weights, _lengths(scan_segments)])
+    mass = np.concatenate([weights, lengths(scan_segments)])
     pairing = Pairing(everything, mass, chosen)
     paired, settled = _create_pairs(everything, mass, len(segments), pairing)
     simplified = _simplify(paired.segments, paired.weights, settled, pairing)
@@ -281,8 +282,3 @@ def _cheapest_matching(first: IntArray, second: IntArray, costs: FloatArray) -> 
             used_first.add(i)
             used_second.add(j)
     return np.array(taken, dtype=np.int64)
-
-
-def _lengths(segments: FloatArray) -> FloatArray:
-    """Return (n,) lengths [m]."""
-    return np.asarray(np.hypot(*(segments[:, 2:] - segments[:, :2]).T))

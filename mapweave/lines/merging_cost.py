@@ -1,7 +1,7 @@
 """Merging two segments in the context of a direction: its cost and its result (paper, VII).
 
 Points are complex numbers in here: ``conj(p) * q`` has the scalar product of p and q as its real
-part and their cross product as its imaginary part, and |p| is a length.
+part and their cross product as its imaginary part, and ``|p|`` is a length.
 
 The paper weighs a pair by the lengths l1, l2. Our extension lets the caller give other weights in
 their place, such as the total length observed, so that a wall seen a hundred times does not move
@@ -70,9 +70,14 @@ class Pairs:
         first_weight: ArrayLike | None = None,
         second_weight: ArrayLike | None = None,
     ) -> "Pairs":
-        """Pair (k, 4) `second` [m] with as many `first`, or with one (1, 4) for all.
+        """Pair segments; L2 is turned round where it is not oriented as L1.
 
-        Weights are (k,) or one for all, and default to the lengths.
+        Parameters
+        ----------
+        first, second
+            L1 and L2, (k, 4) x1 y1 x2 y2 [m] each, one frame; `first` may be one (1, 4) for all.
+        first_weight, second_weight
+            (k,) or one for all [m]: in place of the lengths where the paper weighs the two.
         """
         ends = np.empty((4, len(second)), dtype=np.complex128)
         ends[:2] = _end_points(first)
@@ -109,7 +114,7 @@ class CostTerms(NamedTuple):
     proximity: FloatArray
 
     def total(self, balance: CostWeights) -> FloatArray:
-        """Return C = w1 parC + w2 colC + w3 proxC."""
+        """Return (k,) C = w1 parC + w2 colC + w3 proxC [m], `balance` being w1 to w3."""
         return np.asarray(
             balance.parallelism * self.parallelism
             + balance.collinearity * self.collinearity
@@ -118,7 +123,15 @@ class CostTerms(NamedTuple):
 
 
 def cost_terms(pairs: Pairs, direction: ComplexArray) -> CostTerms:
-    """Return the parts of C(L1, L2, ad) for the unit vectors `direction`."""
+    """Return the parts of C(L1, L2, ad) (paper, VII).
+
+    Parameters
+    ----------
+    pairs
+        k pairs of segments L1, L2.
+    direction
+        (k,) ad, unit vectors.
+    """
     return CostTerms(parallelism(pairs, direction), collinearity(pairs), proximity(pairs))
 
 
@@ -126,7 +139,20 @@ def parallelism(pairs: Pairs, direction: ComplexArray) -> FloatArray:
     """Return (k,) parC [m] for the unit vectors `direction` (paper, VII).
 
     B' lies on the line of direction ad through A and on the perpendicular to L1 through B, so
-    that A, B and B' have their right angle at B: d(B, B') = l1 |tan(angle between L1 and ad)|.
+    that A, B and B' have their right angle at B: ``d(B, B') = l1 |tan α|``, α the angle between
+    L1 and ad.
+
+    Parameters
+    ----------
+    pairs
+        k pairs of segments.
+    direction
+        (k,) ad, unit vectors.
+
+    Returns
+    -------
+    FloatArray
+        (k,) [m]; infinite where ad is orthogonal to one of the two.
     """
     product = pairs.vectors.conj() * direction
     along, across = np.abs(product.real), np.abs(product.imag)

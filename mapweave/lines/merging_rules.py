@@ -9,30 +9,29 @@ What the paper leaves open, and what we chose:
 """
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import ComplexArray, FloatArray
 from mapweave.lines.directions import DirectionParameters, main_directions, nearest_direction
 from mapweave.lines.merging_cost import CostWeights, Pairs, cost_terms, merged_segments
+from mapweave.parameters import StageParameters, derived
 
 
-class MergingParameters(BaseModel):
+class MergingParameters(StageParameters):
     """Which segments are merged, and into what direction."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     max_cost: float = Field(
         default=0.2,
         gt=0,
         description="stop when no pair is cheaper [m]; two 3 m sightings 5 cm apart cost 0.04",
     )
-    max_step: float = Field(
-        default=0.12,
+    max_step: float = derived(
+        lambda c: 6 * c.sensor.range_sigma,
         gt=0,
         description="largest colC [m]: parallel surfaces farther apart stay apart",
     )
-    max_gap: float = Field(
-        default=0.3,
+    max_gap: float = derived(
+        lambda c: 0.5 * c.mapping.door,
         gt=0,
         description="largest proxC [m]: half of a narrow door opening",
     )
@@ -49,8 +48,8 @@ class MergingParameters(BaseModel):
         description="of scan poses [rad]; what `max_step` grows by with the length of the shorter"
         " segment: sightings of a long wall fan out",
     )
-    end_noise: float = Field(
-        default=0.05,
+    end_noise: float = derived(
+        lambda c: 2.5 * c.sensor.range_sigma,
         ge=0,
         description="ends this close along the wall [m] are one end, seen through the noise",
     )
@@ -59,8 +58,8 @@ class MergingParameters(BaseModel):
         ge=0,
         description="a main direction within this of the average is followed [rad]…",
     )
-    max_shift: float = Field(
-        default=0.03,
+    max_shift: float = derived(
+        lambda c: 1.5 * c.sensor.range_sigma,
         ge=0,
         description="…if that moves the ends by this at most [m], the noise of a laser's returns",
     )
@@ -69,7 +68,17 @@ class MergingParameters(BaseModel):
 
 
 class Pairing:
-    """What pairs cost and become, under the main directions of all segments (VI-A)."""
+    """What pairs cost and become, under the main directions of all segments (VI-A).
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m]: all of them, for the main directions.
+    weights
+        (n,) what each contributes to these [m].
+    parameters
+        Which are merged, and into what direction.
+    """
 
     def __init__(
         self, segments: FloatArray, weights: FloatArray, parameters: MergingParameters
@@ -107,5 +116,5 @@ class Pairing:
         return np.where(possible, cost, np.inf)
 
     def merged(self, pairs: Pairs) -> FloatArray:
-        """Return the (k, 4) merged segments."""
+        """Return the (k, 4) merged segments x1 y1 x2 y2 [m], directed as the first of each pair."""
         return merged_segments(pairs, self.direction(pairs), self._parameters.end_noise)

@@ -29,14 +29,14 @@ class SegmentIndex:
         self._cells: dict[int, set[int]] = {}
 
     def add(self, number: int, segment: FloatArray) -> None:
-        """Add the (4,) `segment` x1 y1 x2 y2 [m] under its number."""
+        """Add `segment`, (4,) x1 y1 x2 y2 [m], under a number that is not in use."""
         cells = set(self._keys(segment).tolist())
         self._cells[number] = cells
         for key in cells:
             self._passing.setdefault(key, set()).add(number)
 
     def remove(self, number: int) -> None:
-        """Forget a segment."""
+        """Forget the segment of that number; KeyError if there is none."""
         for key in self._cells.pop(number):
             self._passing[key].discard(number)
 

@@ -10,19 +10,20 @@ nothing more, which is why no wall is doubled.
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.lines.sightings import Nearness, Sightings
+from mapweave.parameters import StageParameters, derived
 
 
-class SelectionParameters(BaseModel):
+class SelectionParameters(StageParameters):
     """What a segment explains, and what it must be worth."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    tolerance: float = Field(
-        0.09, gt=0, description="[m] within which a segment explains what was seen"
+    tolerance: float = derived(
+        lambda c: 4.5 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] within which a segment explains what was seen",
     )
     min_cosine: float = Field(
         -0.5,
@@ -48,9 +49,23 @@ class SelectionParameters(BaseModel):
 def select(
     candidates: FloatArray, evidence: Sightings, price: float, parameters: SelectionParameters
 ) -> IntArray:
-    """Return which of (n, 4) `candidates` [m] to keep, the one that explains most first.
+    """Return which candidates to keep, the one that explains most first.
 
-    `price` is the weight of evidence [m] below which none is kept.
+    Parameters
+    ----------
+    candidates
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    evidence
+        What was seen, the same frame.
+    price
+        The weight of evidence [m] below which none is kept.
+    parameters
+        What a segment explains.
+
+    Returns
+    -------
+    IntArray
+        (k,) indices of candidates, in the order in which they were chosen.
     """
     near = Nearness.of(
         candidates,

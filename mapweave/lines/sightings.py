@@ -5,23 +5,14 @@ their sightings stand for them: a segment seen by 30 scans is 30 times its lengt
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.segments import sample, units
 
 DIRECTION_BINS = 24  # of a full turn: sightings 15° apart are gathered
-
-
-class Samples(NamedTuple):
-    """Points along segments: (n, 2) points and unit directions, (n,) metres each stands for."""
-
-    points: FloatArray
-    directions: FloatArray
-    lengths: FloatArray
-    owner: IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +42,17 @@ class Sightings:
 
     @classmethod
     def of(cls, segments: FloatArray, counts: FloatArray | IntArray, spacing: float) -> "Sightings":
-        """Sample (n, 4) `segments` [m], each seen (n,) `counts` times, every `spacing` [m]."""
+        """Sample sightings.
+
+        Parameters
+        ----------
+        segments
+            (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+        counts
+            (n,) how often each was seen.
+        spacing
+            [m] between samples at most.
+        """
         samples = sample(segments, spacing)
         weights = np.asarray(counts[samples.owner] * samples.lengths, dtype=np.float64)
         return cls(samples.points, samples.directions, weights, spacing)
@@ -102,7 +103,17 @@ class Nearness:
     def of(
         cls, segments: FloatArray, points: FloatArray, directions: FloatArray, reach: float
     ) -> "Nearness":
-        """Pair (n, 4) `segments` [m] with the (m, 2) `points` within `reach` [m] of them."""
+        """Pair segments with the points close to them.
+
+        Parameters
+        ----------
+        segments
+            (n, 4) x1 y1 x2 y2 [m].
+        points, directions
+            (m, 2) [m], the same frame, and unit vectors.
+        reach
+            [m] from a segment at most.
+        """
         tree = shapely.STRtree(shapely.points(points))
         lines = shapely.linestrings(segments.reshape(-1, 2, 2))
         segment, sample = tree.query(lines, predicate="dwithin", distance=reach)
@@ -112,21 +123,3 @@ class Nearness:
         beyond = np.maximum(np.maximum(-along, along - lengths[segment]), 0.0)
         cosine = (own[segment] * directions[sample]).sum(axis=1)
         return cls(segment, sample, along, across, np.hypot(across, beyond), cosine)
-
-
-def sample(segments: FloatArray, spacing: float) -> Samples:
-    """Return points in the middle of equal parts, `spacing` [m] at most, of (n, 4) `segments`."""
-    directions, lengths = units(segments)
-    counts = np.maximum(1, np.ceil(lengths / spacing)).astype(np.int64)
-    owner = np.repeat(np.arange(len(segments)), counts)
-    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    part = (lengths / counts)[owner]
-    points = segments[owner, :2] + ((rank + 0.5) * part)[:, None] * directions[owner]
-    return Samples(points, directions[owner], part, owner)
-
-
-def units(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (n, 2) unit directions and (n,) lengths [m] of (n, 4) `segments`."""
-    vectors = segments[:, 2:] - segments[:, :2]
-    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
-    return vectors / np.maximum(lengths, 1e-12)[:, None], lengths

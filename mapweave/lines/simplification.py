@@ -6,36 +6,38 @@ was seen, so that few segments explain nearly all of it.
 """
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.segments import sample, units
 from mapweave.lines.collinear_junctions import StraighteningParameters, straighten
 from mapweave.lines.corner_junctions import JoiningParameters, join_corners
 from mapweave.lines.directions import main_directions
 from mapweave.lines.fitting import FittingParameters, cut, fit, follow, trim
 from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.selection import SelectionParameters, explained, select, shadowed
-from mapweave.lines.sightings import Nearness, Sightings, sample, units
+from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.lines.t_junctions import WallEndParameters, meet_walls
+from mapweave.parameters import StageParameters, derived
 
 
-class SimplificationParameters(BaseModel):
+class SimplificationParameters(StageParameters):
     """One model for each step."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    spacing: float = Field(0.1, gt=0, description="[m] between samples of what was seen")
+    spacing: float = derived(
+        lambda c: c.mapping.resolution, gt=0, description="[m] between samples of what was seen"
+    )
     missed: float = Field(
         0.5, gt=0, le=1, description="share of a sighting; less explained, it proposes walls anew"
     )
     min_length: float = Field(0.15, ge=0, description="[m] shorter segments are no walls")
-    merging: MergingParameters = MergingParameters()
-    placement: FittingParameters = FittingParameters()
-    selection: SelectionParameters = SelectionParameters()
-    straightening: StraighteningParameters = StraighteningParameters()
-    joining: JoiningParameters = JoiningParameters()
-    wall_ends: WallEndParameters = WallEndParameters()
+    merging: MergingParameters = derived(MergingParameters.of)
+    placement: FittingParameters = derived(FittingParameters.of)
+    selection: SelectionParameters = derived(SelectionParameters.of)
+    straightening: StraighteningParameters = derived(StraighteningParameters.of)
+    joining: JoiningParameters = derived(JoiningParameters.of)
+    wall_ends: WallEndParameters = derived(WallEndParameters.of)
 
 
 def simplify(
@@ -83,15 +85,21 @@ def simplify(
     return meet_walls(join_corners(walls, free, p.joining), free, p.wall_ends)
 
 
-def sources(segments: FloatArray, sightings: FloatArray) -> tuple[IntArray, IntArray]:
+def sources(
+    segments: FloatArray,
+    sightings: FloatArray,
+    parameters: SimplificationParameters | None = None,
+) -> tuple[IntArray, IntArray]:
     """Return pairs of a segment and a sighting of it: most of the one lies along the other.
 
     Parameters
     ----------
     segments, sightings
         (n, 4) and (k, 4) [m], one frame.
+    parameters
+        Those that the segments were simplified with: what was of a segment then is a sighting now.
     """
-    p = SimplificationParameters()
+    p = parameters or SimplificationParameters()
     points, directions, lengths, owner = sample(sightings, 2 * p.spacing)
     near = Nearness.of(segments, points, directions, p.placement.tolerance)
     along = np.flatnonzero(near.cosine >= np.cos(p.placement.parallel))

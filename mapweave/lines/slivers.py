@@ -6,22 +6,22 @@ goes beyond the paper, for its own aim: the fewest segments that represent what 
 """
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.lines.merging import Evolution
+from mapweave.parameters import StageParameters, derived
 
 
-class SliverParameters(BaseModel):
+class SliverParameters(StageParameters):
     """What a sliver is."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     max_length: float = Field(
         default=0.4, gt=0, description="longer segments are no slivers [m]; half a door"
     )
-    max_distance: float = Field(
-        default=0.15,
+    max_distance: float = derived(
+        lambda c: 7.5 * c.sensor.range_sigma,
         gt=0,
         description="how far a sliver reaches away from the longer segment at most [m]; laser"
         " noise and the tolerance of segments, on both sides of a rough wall",
@@ -55,10 +55,10 @@ def absorb_slivers(
         that each took over, and where every input went.
     """
     chosen = parameters or SliverParameters()
-    lengths = np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
+    length = lengths(segments)
     owner = np.arange(len(segments))
-    for number in np.flatnonzero(lengths <= chosen.max_length):
-        longer = np.flatnonzero(lengths > lengths[number])  # so no two own each other
+    for number in np.flatnonzero(length <= chosen.max_length):
+        longer = np.flatnonzero(length > length[number])  # so no two own each other
         distance = _distance(segments[number], segments[longer], chosen.max_angle)
         if len(longer) and distance.min() <= chosen.max_distance:
             owner[number] = longer[np.argmin(distance)]

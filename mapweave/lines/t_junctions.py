@@ -7,25 +7,32 @@ face or goes through it by no more than noise, is moved along its own line to th
 import numpy as np
 import scipy
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
-from mapweave.lines.corner_junctions import cross, length_inside
-from mapweave.lines.sightings import units
+from mapweave.geometry.segments import cross, units
+from mapweave.lines.corner_junctions import length_inside
+from mapweave.parameters import StageParameters, derived
 
 
-class WallEndParameters(BaseModel):
+class WallEndParameters(StageParameters):
     """Which ends are at a wall."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     max_extension: float = Field(0.2, ge=0, description="[m] by which a wall may grow to another")
-    max_overhang: float = Field(0.12, ge=0, description="[m] of it behind the other to be cut off")
+    max_overhang: float = derived(
+        lambda c: 6 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] of it behind the other to be cut off",
+    )
     min_angle: float = Field(
         np.deg2rad(30.0), gt=0, description="[rad] between both; flatter, no face is met"
     )
-    max_crossing: float = Field(0.1, ge=0, description="[m] of free space that noise may explain")
+    max_crossing: float = derived(
+        lambda c: 5 * c.sensor.range_sigma,
+        ge=0,
+        description="[m] of free space that noise may explain",
+    )
     meeting: float = Field(1e-6, ge=0, description="[m] within which an end has met another end")
 
 
@@ -34,7 +41,14 @@ def meet_walls(
 ) -> FloatArray:
     """Return (n, 4) `segments` [m] with their loose ends at the walls that they nearly reach.
 
-    `free` is what was seen through, the same frame: no wall grows into it.
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    free
+        What was seen through, the same frame [m]: no wall grows into it.
+    parameters
+        Which ends are at a wall.
     """
     if len(segments) < 2:
         return segments

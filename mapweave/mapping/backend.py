@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
@@ -23,20 +22,21 @@ from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.pose_covariance import EXACT
 from mapweave.maps import LineMap, Submap, Trajectory
 from mapweave.matching.multiview_icp import MultiviewIcpParameters, refine
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, join_points, points_on_lines
 
 
-class BackendParameters(BaseModel):
+class BackendParameters(StageParameters):
     """One model for each stage."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    submap: SubmapParameters = SubmapParameters()
-    component_merging: ComponentMergingParameters = ComponentMergingParameters()
-    loops: LoopParameters = LoopParameters()
-    kidnapping: KidnapDetectionParameters = KidnapDetectionParameters()
-    refinement: MultiviewIcpParameters = MultiviewIcpParameters()
-    spacing: float = Field(0.1, gt=0, description="[m] between points on older walls")
+    submap: SubmapParameters = derived(SubmapParameters.of)
+    component_merging: ComponentMergingParameters = derived(ComponentMergingParameters.of)
+    loops: LoopParameters = derived(LoopParameters.of)
+    kidnapping: KidnapDetectionParameters = derived(KidnapDetectionParameters.of)
+    refinement: MultiviewIcpParameters = derived(MultiviewIcpParameters.of)
+    spacing: float = derived(
+        lambda c: c.mapping.resolution, gt=0, description="[m] between points on older walls"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

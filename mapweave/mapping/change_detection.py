@@ -8,24 +8,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.scan import Scan
 from mapweave.scan.visibility import seen_through
 
 
-class ChangeDetectionParameters(BaseModel):
+class ChangeDetectionParameters(StageParameters):
     """When a segment counts as seen through, and how often it must be."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    spacing: float = Field(0.1, gt=0, description="[m] between the points asked")
-    clearance: float = Field(
-        0.3, gt=0, description="[m] by which seeing through must be certain, as in tracking"
+    spacing: float = derived(
+        lambda c: c.mapping.resolution, gt=0, description="[m] between the points asked"
     )
-    sight: float = Field(10.0, gt=0, description="[m] up to which it counts, as for free space")
+    clearance: float = derived(
+        lambda c: c.mapping.clearance,
+        gt=0,
+        description="[m] by which seeing through must be certain, as in tracking",
+    )
+    sight: float = derived(
+        lambda c: c.mapping.free_range,
+        gt=0,
+        description="[m] up to which it counts, as for free space",
+    )
     incidence: float = Field(
         0.26,
         ge=0,

@@ -11,25 +11,27 @@ from dataclasses import replace
 from itertools import groupby, pairwise
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.fusion.align import FusionParameters, compare, prepare
 from mapweave.fusion.decision import DecisionParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.mapping.place_recognition import PlaceRecognitionParameters, PlaceRecognizer
 from mapweave.maps import Alignment, Submap, lines_of
 from mapweave.matching.hypotheses import PreparedMap
+from mapweave.parameters import StageParameters, derived
 
 
-class ComponentMergingParameters(BaseModel):
+class ComponentMergingParameters(StageParameters):
     """When components are compared, and where a robot that lost track is looked for."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     # Nothing undoes a join within a robot's map, so a shape is asked for, not straight walls alone.
-    fusion: FusionParameters = FusionParameters(decision=DecisionParameters(plain_held=math.inf))
-    place_recognition: PlaceRecognitionParameters = PlaceRecognitionParameters()
+    fusion: FusionParameters = derived(
+        lambda c: FusionParameters.of(c, decision=DecisionParameters.of(c, plain_held=math.inf))
+    )
+    place_recognition: PlaceRecognitionParameters = derived(PlaceRecognitionParameters.of)
     min_confidence: float = Field(
         0.5,
         gt=0,
@@ -43,9 +45,15 @@ class ComponentMergingParameters(BaseModel):
     growth: float = Field(
         0.15, gt=0, description="share by which either has grown before a pair is compared again"
     )
-    reach: float = Field(3.0, gt=0, description="[m] that a robot came while it was lost, at most")
-    max_reach: float = Field(
-        7.5, gt=0, description="[m] the same with a piece in between, its path included"
+    reach: float = derived(
+        lambda c: 1.5 * c.robot.max_speed,
+        gt=0,
+        description="[m] that a robot came while it was lost, at most",
+    )
+    max_reach: float = derived(
+        lambda c: 3.75 * c.robot.max_speed,
+        gt=0,
+        description="[m] the same with a piece in between, its path included",
     )
     gaps: int = Field(
         2, ge=1, description="between two components where it is looked for, the last"
@@ -188,7 +196,7 @@ def _covering(inside: Sequence[Submap], p: ComponentMergingParameters) -> list[S
     """
     kept: list[tuple[Submap, tuple[float, float]]] = []
     for submap in reversed(inside):
-        middle = _middle(submap)
+        middle = _middle_of_walls(submap)
         if sum(math.dist(middle, other) < p.place for _, other in kept) < p.visits:
             kept.append((submap, middle))
     return [submap for submap, _ in reversed(kept)]
@@ -244,7 +252,7 @@ def _pose(submap: Submap, scan: int) -> FloatArray:
 
 def _nearest(submaps: Sequence[Submap], component: int, younger: set[int]) -> tuple[int, int]:
     """Return the ids of the nearest two submaps, one in `younger` and one that is not."""
-    inside = [(s.id, _middle(s)) for s in submaps if s.component == component]
+    inside = [(s.id, _middle_of_walls(s)) for s in submaps if s.component == component]
     _, first, second = min(
         (math.dist(a, b), one, other)
         for one, a in inside
@@ -257,22 +265,18 @@ def _nearest(submaps: Sequence[Submap], component: int, younger: set[int]) -> tu
 
 def _nearest_to(number: int, submaps: Sequence[Submap], others: set[int]) -> int:
     """Return the id of that of `others` which is nearest to submap `number`."""
-    here = _middle(submaps[number])
-    return min(others, key=lambda other: math.dist(here, _middle(submaps[other])))
+    here = _middle_of_walls(submaps[number])
+    return min(others, key=lambda other: math.dist(here, _middle_of_walls(submaps[other])))
 
 
-def _middle(submap: Submap) -> tuple[float, float]:
+def _middle_of_walls(submap: Submap) -> tuple[float, float]:
     """Middle of a submap's walls, component frame [m]; of none its frame's origin."""
     points = submap.map.segments.reshape(-1, 2)
-    middle = points.mean(axis=0) if len(points) else np.zeros(2)
-    x, y = se2.transform_points(submap.pose, middle).tolist()
+    centre = points.mean(axis=0) if len(points) else np.zeros(2)
+    x, y = se2.transform_points(submap.pose, centre).tolist()
     return x, y
 
 
 def _wall(submaps: Sequence[Submap], component: int) -> float:
     """[m] of wall in the submaps of a component."""
-    return sum(
-        float(np.hypot(*(s.map.segments[:, 2:] - s.map.segments[:, :2]).T).sum())
-        for s in submaps
-        if s.component == component
-    )
+    return sum(float(lengths(s.map.segments).sum()) for s in submaps if s.component == component)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -21,13 +21,12 @@ from mapweave.mapping.loop_closing import SubmapMatch
 from mapweave.maps import Submap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import Verdict
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints
 
 
-class KidnapDetectionParameters(BaseModel):
+class KidnapDetectionParameters(StageParameters):
     """How much contradiction is a departure."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     contradicted: float = Field(
         12.0,
@@ -39,9 +38,17 @@ class KidnapDetectionParameters(BaseModel):
     share: float = Field(
         0.2, gt=0, lt=1, description="of the wall that both looked at, contradicted"
     )
-    closeness: float = Field(0.25, gt=0, description="[m] from a wall that explains a return")
-    clearance: float = Field(0.3, gt=0, description="[m] inside seen free space that refutes one")
-    sight: float = Field(12.0, gt=0, description="[m] up to which returns count")
+    closeness: float = derived(
+        lambda c: c.mapping.closeness, gt=0, description="[m] from a wall that explains a return"
+    )
+    clearance: float = derived(
+        lambda c: c.mapping.clearance,
+        gt=0,
+        description="[m] inside seen free space that refutes one",
+    )
+    sight: float = derived(
+        lambda c: 1.2 * c.mapping.free_range, gt=0, description="[m] up to which returns count"
+    )
     doubtful: float = Field(
         0.08, gt=0, lt=1, description="share of a scan's returns refuted, from which it departs"
     )

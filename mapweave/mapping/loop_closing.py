@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -22,20 +22,27 @@ from mapweave.matching.distance_field import DistanceField, DistanceFieldParamet
 from mapweave.matching.hypotheses import HypothesisParameters, different
 from mapweave.matching.icp import Fit, IcpParameters, Target, align
 from mapweave.matching.verification import Verdict, VerificationParameters, coarse_scores, verify
+from mapweave.parameters import StageParameters, derived
 
 
-class LoopParameters(BaseModel):
+class LoopParameters(StageParameters):
     """Where closures are looked for and what they must show."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     graph: SubmapGraphParameters = SubmapGraphParameters()
-    raster: DistanceFieldParameters = DistanceFieldParameters()
-    verification: VerificationParameters = VerificationParameters()
-    hypotheses: HypothesisParameters = HypothesisParameters(count=3, distance=0.6)
-    icp: IcpParameters = IcpParameters(start_scale=0.4, end_scale=0.05)
+    raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)
+    verification: VerificationParameters = derived(VerificationParameters.of)
+    hypotheses: HypothesisParameters = derived(
+        lambda c: HypothesisParameters.of(c, count=3, distance=0.6)
+    )
+    icp: IcpParameters = derived(
+        lambda c: IcpParameters.of(c, start_scale=0.4, end_scale=2.5 * c.sensor.range_sigma)
+    )
     candidates: int = Field(8, ge=1, description="older submaps compared, the nearest")
-    reach: float = Field(12.0, gt=0, description="[m] between the middles of submaps compared")
+    reach: float = derived(
+        lambda c: c.mapping.submap_length,
+        gt=0,
+        description="[m] between the middles of submaps compared",
+    )
     drift: float = Field(0.02, gt=0, description="[m/m] of path, the most that is expected")
     min_drift: float = Field(0.6, gt=0, description="[m] searched at the least")
     max_drift: float = Field(4.0, gt=0, description="[m] searched at the most")
@@ -50,8 +57,8 @@ class LoopParameters(BaseModel):
     min_overlap: float = Field(0.85, gt=0, le=1, description="share in common of what both saw")
     min_held: float = Field(2.0, gt=0, description="[m] of common wall across any direction")
     max_rival: float = Field(0.75, gt=0, description="score of the next best pose, as a share")
-    residual: float = Field(
-        0.15,
+    residual: float = derived(
+        lambda c: 7.5 * c.sensor.range_sigma,
         gt=0,
         description="[m] of one wall sample against the pose: far above a laser's, because samples"
         " of one wall err together; so that a closure's sigma is what closures err by against"
@@ -112,13 +119,13 @@ class LoopCloser:
         if len(newest.map.segments) == 0:
             return []
         paths = self.graph.lengths_from(newest.id, len(submaps))
-        here = middle(newest)
+        here = middle_of_path(newest)
         near = [
             (distance, path, s)
             for s, path in zip(older[:-1], paths, strict=False)
             if s.component == newest.component
             and len(s.map.segments)
-            and (distance := math.dist(middle(s), here)) < p.reach + _drift(path, p)
+            and (distance := math.dist(middle_of_path(s), here)) < p.reach + _drift(path, p)
         ]
         nearest = sorted(near, key=lambda item: item[0])[: p.candidates]
         return [self.compare_two(s, newest, path) for _, path, s in nearest]
@@ -147,7 +154,7 @@ class LoopCloser:
         return raster, Target.of(raster.oriented, self._parameters.icp)
 
 
-def middle(submap: Submap) -> FloatArray:
+def middle_of_path(submap: Submap) -> FloatArray:
     """(2,) middle of a submap's path, component frame [m]."""
     return se2.transform_points(submap.pose, submap.trajectory.pose[:, :2].mean(axis=0))
 

@@ -6,8 +6,7 @@ nowhere waits; when several in a row fit nowhere, the robot is lost and starts a
 
 from dataclasses import dataclass, replace
 
-from pydantic import BaseModel, ConfigDict, Field
-
+from mapweave.config import Config
 from mapweave.errors import ArgumentError, FinishedError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -22,21 +21,20 @@ from mapweave.mapping.tracking.pose_covariance import (
     turn_uncertainty,
 )
 from mapweave.mapping.tracking.tracker import Found, Tracker, TrackerParameters
-from mapweave.maps import LineMap, RobotMap, Submap
+from mapweave.maps import LineMap, MadeWith, RobotMap, Submap
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.scan import UNNUMBERED, Scan
 
 
-class MapperParameters(BaseModel):
+class MapperParameters(StageParameters):
     """One model for each stage."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    observation: ObservationParameters = ObservationParameters()
-    tracker: TrackerParameters = TrackerParameters()
-    uncertainty: PoseCovarianceParameters = PoseCovarianceParameters()
-    backend: BackendParameters = BackendParameters()
-    patience: int = Field(
-        5,
+    observation: ObservationParameters = derived(ObservationParameters.of)
+    tracker: TrackerParameters = derived(TrackerParameters.of)
+    uncertainty: PoseCovarianceParameters = derived(PoseCovarianceParameters.of)
+    backend: BackendParameters = derived(BackendParameters.of)
+    patience: int = derived(
+        lambda c: c.mapping.patience,
         ge=1,
         description="scans in a row that fit nowhere, or were not confirmed by the next one, before"
         " the robot counts as lost",
@@ -80,9 +78,13 @@ class Mapper:
     ----------
     robot, boot
         The robot's id, ``[a-z0-9][a-z0-9_-]{0,31}``, and which run of it this is.
-    settling
+    parameters
+        Of every stage; those that derive from `config` by default.
+    backend
         Settles finished submaps with the parameters given here, as by default it is done in
         between; the map is the same.
+    config
+        What the map says that it was made with, unless other parameters are given.
     """
 
     def __init__(
@@ -91,10 +93,14 @@ class Mapper:
         boot: str = "0",
         parameters: MapperParameters | None = None,
         backend: BackendRunner | None = None,
+        config: Config | None = None,
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
-        self.parameters = parameters or MapperParameters()
+        config = config or Config()
+        self.parameters = parameters or MapperParameters.of(config)
+        known = self.parameters == MapperParameters.of(config)
+        self._made_with = MadeWith.of(config) if known else None
         self._version = 0
         self._finished: list[Submap] = []
         self._component = self._newest_component = 0
@@ -158,7 +164,8 @@ class Mapper:
     def robot_map(self) -> RobotMap:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap()]
-        return RobotMap(self.robot, self.boot, self._version, (*self._finished, *growing))
+        submaps = (*self._finished, *growing)
+        return RobotMap(self.robot, self.boot, self._version, submaps, self._made_with)
 
     def _numbered(self, scan: Scan) -> Scan:
         """Return `scan` with its index, which may be the next; errors as of `add`."""

@@ -8,7 +8,7 @@ is there.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.fusion.align import FusionParameters, compare, prepare
 from mapweave.fusion.parts import PartParameters, difference
@@ -17,15 +17,14 @@ from mapweave.maps import Submap, lines_of
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.matching.verification import verify
+from mapweave.parameters import StageParameters, derived
 
 
-class PlaceRecognitionParameters(BaseModel):
+class PlaceRecognitionParameters(StageParameters):
     """What is looked for, and when it is found."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     submaps: int = Field(3, ge=1, description="that are rigid together, some 36 m of path")
-    agreement: PartParameters = PartParameters()
+    agreement: PartParameters = derived(PartParameters.of)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

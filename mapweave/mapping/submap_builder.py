@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry import se2
@@ -13,7 +13,7 @@ from mapweave.lines.merging import MergingParameters, count_support, merge_scan
 from mapweave.lines.polylines import group_polylines
 from mapweave.lines.selection import SelectionParameters
 from mapweave.lines.simplification import SimplificationParameters, simplify, sources
-from mapweave.lines.slivers import absorb_slivers
+from mapweave.lines.slivers import SliverParameters, absorb_slivers
 from mapweave.mapping.change_detection import (
     ChangeDetectionParameters,
     Viewpoint,
@@ -22,30 +22,41 @@ from mapweave.mapping.change_detection import (
 )
 from mapweave.mapping.tracking.pose_covariance import EXACT
 from mapweave.maps import LineMap, Trajectory
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.free_space import FreeSpaceParameters, rings, scan_free_space, unite
 from mapweave.scan.scan import Scan
 
 
-class SubmapParameters(BaseModel):
+class SubmapParameters(StageParameters):
     """What goes into a submap and when it is finished."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    length: float = Field(
-        12.0, gt=0, description="[m] of path that finish a submap; drift inside is negligible"
+    length: float = derived(
+        lambda c: c.mapping.submap_length,
+        gt=0,
+        description="[m] of path that finish a submap; drift inside is negligible",
     )
     max_turn: float = Field(25.0, gt=0, description="[rad] of turning that finish one")
-    max_scans: int = Field(400, ge=1, description="placed scans that finish one")
-    max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
+    max_scans: int = derived(
+        lambda c: c.mapping.submap_scans, ge=1, description="placed scans that finish one"
+    )
+    max_gap: float = derived(
+        lambda c: c.mapping.max_gap, gt=0, description="[m] within a generalized polyline"
+    )
     free_space_step: float = Field(0.2, gt=0, description="[m] of motion between free-space scans")
-    free_space_turn: float = Field(0.26, gt=0, description="[rad] of rotation between them: 15°")
-    merging: MergingParameters = MergingParameters()
-    free_space: FreeSpaceParameters = FreeSpaceParameters()
-    change_detection: ChangeDetectionParameters = ChangeDetectionParameters()
-    simplification: SimplificationParameters = SimplificationParameters(
-        # Poses err less here than among submaps; and what is little here may be much together.
-        placement=FittingParameters(tolerance=0.07),
-        selection=SelectionParameters(tolerance=0.07, price=0.03),
+    free_space_turn: float = derived(
+        lambda c: c.mapping.keyframe_turn, gt=0, description="[rad] of rotation between them: 15°"
+    )
+    merging: MergingParameters = derived(MergingParameters.of)
+    free_space: FreeSpaceParameters = derived(FreeSpaceParameters.of)
+    change_detection: ChangeDetectionParameters = derived(ChangeDetectionParameters.of)
+    slivers: SliverParameters = derived(SliverParameters.of)
+    # Poses err less here than among submaps; and what is little here may be much together.
+    simplification: SimplificationParameters = derived(
+        lambda c: SimplificationParameters.of(
+            c,
+            placement=FittingParameters.of(c, tolerance=3.5 * c.sensor.range_sigma),
+            selection=SelectionParameters.of(c, tolerance=3.5 * c.sensor.range_sigma, price=0.03),
+        )
     )
 
 
@@ -133,7 +144,7 @@ class SubmapBuilder:
         sightings, scans = seen.segments[kept], seen.scans[kept]
         once = np.ones(len(kept), dtype=np.int64)
         walls = simplify(merged[left], sightings, once, free, p.simplification)
-        wall, source = sources(walls, sightings)
+        wall, source = sources(walls, sightings, p.simplification)
         found, labels = np.unique(wall, return_inverse=True)
         lines = self._grouped(walls[found], *self._still_there(walls[found], labels, scans[source]))
         return replace(lines, free_space=rings(free))
@@ -145,7 +156,7 @@ class SubmapBuilder:
 
     def _standing(self) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
         """Return merged segments, whose each sighting is, which are left, and their support."""
-        whole = absorb_slivers(self._segments, self._weights)
+        whole = absorb_slivers(self._segments, self._weights, self._parameters.slivers)
         labels = whole.labels[self._sightings.labels]
         left, support = self._still_there(whole.segments, labels, self._sightings.scans)
         return whole.segments, labels, left, support

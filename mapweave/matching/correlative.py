@@ -8,24 +8,28 @@ is small enough to score every one of them, on a raster of nearness.
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import Float32Array, FloatArray
 from mapweave.kernels.correlative import nearness_field, window_scores
+from mapweave.parameters import StageParameters, derived
 
 
-class CorrelativeParameters(BaseModel):
+class CorrelativeParameters(StageParameters):
     """The window of motions and its resolution."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     half_width: float = Field(14.0, gt=0, description="[m] of the raster about its centre")
-    cell: float = Field(0.1, gt=0, description="[m] of the raster")
+    cell: float = derived(lambda c: c.mapping.resolution, gt=0, description="[m] of the raster")
     nearness: float = Field(
         0.15, gt=0, description="[m] standard deviation of the nearness kernel: half a step"
     )
-    reach: float = Field(1.2, gt=0, description="[m] of translation, each way")
+    reach: float = derived(
+        lambda c: min(10.0, 0.2 + 0.5 * c.robot.max_speed * c.sensor.interval),
+        gt=0,
+        description="[m] of translation, each way: half of what is driven, and a step; beyond 10 m"
+        " little of the raster is left to compare with",
+    )
     step: float = Field(0.2, gt=0, description="[m] between translations")
     turn_step: float = Field(0.052, gt=0, description="[rad] between rotations: 3 degrees")
     max_points: int = Field(120, ge=10, description="scan points that vote")

@@ -8,20 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
+from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, points_on_lines
 
 
-class DistanceFieldParameters(BaseModel):
+class DistanceFieldParameters(StageParameters):
     """Sampling of walls and space."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    cell: float = Field(0.1, gt=0, description="[m] of the raster")
-    spacing: float = Field(0.2, gt=0, description="[m] between samples of a wall")
+    cell: float = derived(lambda c: c.mapping.resolution, gt=0, description="[m] of the raster")
+    spacing: float = derived(
+        lambda c: 2 * c.mapping.resolution, gt=0, description="[m] between samples of a wall"
+    )
     border: float = Field(1.0, gt=0, description="[m] around the map")
     full_support: int = Field(
         2, ge=1, description="scans that make a wall count in full; one may have seen a passer-by"
@@ -67,10 +69,10 @@ class DistanceField:
         """Rasterise `line_map`, which has at least one segment."""
         p = parameters
         oriented, segment = points_on_lines(line_map, p.spacing)
-        lengths = np.hypot(*(line_map.segments[:, 2:] - line_map.segments[:, :2]).T)
-        counts = np.bincount(segment, minlength=len(lengths))
+        length = lengths(line_map.segments)
+        counts = np.bincount(segment, minlength=len(length))
         trust = np.minimum(1.0, line_map.support / p.full_support)
-        weight = (trust * lengths / np.maximum(counts, 1))[segment]
+        weight = (trust * length / np.maximum(counts, 1))[segment]
         low = oriented.points.min(axis=0) - p.border
         high = oriented.points.max(axis=0) + p.border
         cell = max(p.cell, float(np.sqrt(np.prod(high - low) / p.max_cells)))

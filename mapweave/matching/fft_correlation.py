@@ -19,25 +19,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray
 from mapweave.matching.distance_field import DistanceField
+from mapweave.parameters import StageParameters, derived
 
 STEP = 2  # every second row and column of a map's raster is fine enough
 
 
-class FftCorrelationParameters(BaseModel):
+class FftCorrelationParameters(StageParameters):
     """How fine and how many."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     cell: float = Field(0.3, gt=0, description="[m] of the rasters: what alignment mends")
     max_size: int = Field(400, ge=16, description="[cells] along both maps; larger get coarser")
     turns: int = Field(4, ge=1, description="the most likely ones; a rectangular building has four")
     shifts: int = Field(50, ge=1, description="handed on for each turn, the best")
-    clearance: float = Field(
-        0.5,
+    clearance: float = derived(
+        lambda c: 5 / 3 * c.mapping.clearance,
         gt=0,
         description="[m] inside seen free space from which a wall contradicts; more than"
         " when it is verified, for the shift and the turn are rough",

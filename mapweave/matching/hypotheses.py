@@ -12,7 +12,7 @@ figures in docs/paper.md). The loop as the paper prints it is `mapweave.fusion.r
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -22,20 +22,19 @@ from mapweave.matching.distance_field import DistanceField, DistanceFieldParamet
 from mapweave.matching.fft_correlation import FftCorrelationParameters, Marks, correlate
 from mapweave.matching.field_icp import FieldIcpParameters, align_on_raster
 from mapweave.matching.verification import VerificationParameters, coarse_scores
+from mapweave.parameters import StageParameters, derived
 from mapweave.shape.corners import CornerParameters, Corners, find_corners, propose
 from mapweave.shape.windows import WindowParameters, Windows, all_windows, match_all
 
 
-class HypothesisParameters(BaseModel):
+class HypothesisParameters(StageParameters):
     """What proposes, and how many proposals survive."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     windows: WindowParameters = WindowParameters(
         lengths=(1.5, 4.0), samples=16, stride=0.15, max_windows=250, max_candidates=200
     )
     corners: CornerParameters = CornerParameters()
-    correlation: FftCorrelationParameters = FftCorrelationParameters()
+    correlation: FftCorrelationParameters = derived(FftCorrelationParameters.of)
     turn_separation: float = Field(0.17, gt=0, description="[rad] between likely turns: 10°")
     alignment: FieldIcpParameters = FieldIcpParameters()
     proposal_samples: int = Field(60, ge=10, description="of a map's walls, scoring proposals")

@@ -11,19 +11,18 @@ partner's normal, because a wall holds a point across it and not along it.
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.kernels.point_map import IcpSettings, PointMap, icp_settings, make_point_map
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints
 
 CELL = 0.2  # [m] of the grid that partners are looked up in
 
 
-class IcpParameters(BaseModel):
+class IcpParameters(StageParameters):
     """How far points look for partners and how strongly they pull."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     normal_weight: float = Field(
         0.4, gt=0, description="[m] how far apart opposite normals hold two points, halved"
@@ -33,15 +32,19 @@ class IcpParameters(BaseModel):
         gt=0,
         description="[m] residual at which a pair's weight is a quarter, first iteration",
     )
-    end_scale: float = Field(0.04, gt=0, description="[m] the same at the end: some 2 sigma (SICK)")
+    end_scale: float = derived(
+        lambda c: 2 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] the same at the end: some 2 sigma (SICK)",
+    )
     shrink: float = Field(0.75, gt=0, lt=1, description="of the scale, each iteration")
     max_iterations: int = Field(25, ge=1)
     converged: float = Field(
         2e-4, gt=0, description="[m, rad] smallest step worth another iteration"
     )
     trial: int = Field(5, ge=0, description="iterations after which poor starts may be dropped")
-    noise: float = Field(
-        0.1,
+    noise: float = derived(
+        lambda c: c.sensor.residual_sigma,
         gt=0,
         description="[m] of a residual against the prior; above the sensor's, because neighbouring"
         " returns err alike",

@@ -10,31 +10,32 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, join_points
 
 STAYS = -1  # the owner of points that do not move
 
 
-class MultiviewIcpParameters(BaseModel):
+class MultiviewIcpParameters(StageParameters):
     """How scans of a submap pull at each other, and what holds them."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     max_points: int = Field(60, ge=10, description="of a scan")
     partners: int = Field(6, ge=1, description="places that a point is drawn to, the nearest")
     normal_weight: float = Field(
         0.4, gt=0, description="[m] how far apart opposite normals hold two points, halved"
     )
-    scales: tuple[float, ...] = Field(
-        (0.15, 0.1, 0.06, 0.04, 0.04),
+    scales: tuple[float, ...] = derived(
+        lambda c: tuple(f * c.sensor.range_sigma for f in (7.5, 5.0, 3.0, 2.0, 2.0)),
         description="[m] residual at which a pair's weight has quartered, in each iteration",
     )
-    noise: float = Field(
-        0.1, gt=0, description="[m] of a point's residual: neighbouring returns err alike"
+    noise: float = derived(
+        lambda c: c.sensor.residual_sigma,
+        gt=0,
+        description="[m] of a point's residual: neighbouring returns err alike",
     )
     step_sigma: float = Field(0.05, gt=0, description="[m] of a tracked step between two scans")
     turn_sigma: float = Field(0.02, gt=0, description="[rad] the same for its turn")

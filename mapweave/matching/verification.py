@@ -8,12 +8,13 @@ wall of one map where the other saw through is a contradiction.
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
+from mapweave.parameters import StageParameters, derived
 from mapweave.shape.tangent_space import complexities
 
 DIRECTIONS = 64  # that coarse scores tell apart: 5.6° each
@@ -21,19 +22,19 @@ AT_ONCE = 20_000  # transforms scored: their samples take some 10 MB an array
 NOTHING, SEEN_THROUGH = DIRECTIONS, DIRECTIONS + 1  # what a cell without a wall says
 
 
-class VerificationParameters(BaseModel):
+class VerificationParameters(StageParameters):
     """When walls coincide and when they contradict."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    closeness: float = Field(
-        0.25, gt=0, description="[m] Hausdorff distance below which walls coincide"
+    closeness: float = derived(
+        lambda c: c.mapping.closeness,
+        gt=0,
+        description="[m] Hausdorff distance below which walls coincide",
     )
     min_cosine: float = Field(
         0.8, gt=0, le=1, description="of the angle between normals of coinciding walls: 37°"
     )
-    clearance: float = Field(
-        0.3,
+    clearance: float = derived(
+        lambda c: c.mapping.clearance,
         gt=0,
         description="[m] inside seen free space from which a wall contradicts; covers"
         " what two maps are bent against each other",

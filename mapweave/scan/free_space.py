@@ -8,25 +8,28 @@ from collections.abc import Iterable
 
 import numpy as np
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.scan import Scan
 from mapweave.scan.visibility import clear_ranges
 
 
-class FreeSpaceParameters(BaseModel):
+class FreeSpaceParameters(StageParameters):
     """How far and how surely a scan clears space."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    sight: float = Field(
-        10.0, gt=0, description="[m] beyond, neighbouring beams are too far apart to prove much"
+    sight: float = derived(
+        lambda c: c.mapping.free_range,
+        gt=0,
+        description="[m] beyond, neighbouring beams are too far apart to prove much",
     )
-    margin: float = Field(0.15, ge=0, description="[m] kept from what the beams hit")
+    margin: float = derived(
+        lambda c: 0.5 * c.mapping.clearance, ge=0, description="[m] kept from what the beams hit"
+    )
     simplification: float = Field(
         0.1, gt=0, description="[m] by which outlines may deviate; below the margin"
     )
@@ -35,7 +38,22 @@ class FreeSpaceParameters(BaseModel):
 
 
 def scan_free_space(scan: Scan, pose: FloatArray, parameters: FreeSpaceParameters) -> BaseGeometry:
-    """Return what `scan`, taken at `pose` (3,), saw to be free: polygons in the pose's parent."""
+    """Return what a scan saw to be free.
+
+    Parameters
+    ----------
+    scan
+        One sweep.
+    pose
+        (3,) of the sensor [m, m, rad].
+    parameters
+        How far and how surely a scan clears space.
+
+    Returns
+    -------
+    BaseGeometry
+        An area [m] in the frame that `pose` is given in; empty where nothing was cleared.
+    """
     reach = np.maximum(clear_ranges(scan, parameters.sight) - parameters.margin, 0.0)
     rim = reach[:, None] * np.column_stack([np.cos(scan.angles), np.sin(scan.angles)])
     fans = [
@@ -49,7 +67,15 @@ def scan_free_space(scan: Scan, pose: FloatArray, parameters: FreeSpaceParameter
 
 
 def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> BaseGeometry:
-    """Return the union of `pieces`, its outline simplified, crumbs left out."""
+    """Return the union of `pieces`, its outline simplified, crumbs left out.
+
+    Parameters
+    ----------
+    pieces
+        Areas in one frame [m], such as those of several scans.
+    parameters
+        How much an outline is simplified, and what is a crumb.
+    """
     union = shapely.union_all(list(pieces))
     # Opened: a view through a crack clears nothing that would matter, and costs many vertices.
     if union.is_empty:
@@ -62,7 +88,18 @@ def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> Ba
 
 
 def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:
-    """Return simple polygons without holes that cover `free_space`, each (k, 2) [m]."""
+    """Return simple polygons without holes that cover `free_space`, as maps hold them.
+
+    Parameters
+    ----------
+    free_space
+        An area [m]; its holes are cut through.
+
+    Returns
+    -------
+    tuple of FloatArray
+        (k, 2) the vertices of each [m], the first one not repeated.
+    """
     return tuple(
         np.array(piece.exterior.coords)[:-1]
         for polygon in _polygons(free_space)
@@ -71,7 +108,13 @@ def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:
 
 
 def from_rings(outlines: Iterable[FloatArray]) -> BaseGeometry:
-    """Return the union of simple polygons (k, 2) [m]; the inverse of `rings`."""
+    """Return the union of simple polygons; the inverse of `rings`.
+
+    Parameters
+    ----------
+    outlines
+        (k, 2) the vertices of each [m], one frame; those of fewer than three are no area.
+    """
     polygons = [Polygon(ring) for ring in outlines if len(ring) >= 3]
     return shapely.union_all(shapely.make_valid(polygons)) if polygons else Polygon()
 
@@ -83,8 +126,9 @@ def _positive_runs(reach: FloatArray) -> list[tuple[int, int]]:
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:
-    """The polygons in `geometry`; stray points and lines have no area and are left out."""
-    return [p for p in shapely.get_parts(geometry, return_index=False) if isinstance(p, Polygon)]
+    """The polygons in `geometry`; what has no area, as stray points and lines, is left out."""
+    parts = shapely.get_parts(geometry)
+    return [p for p in parts if isinstance(p, Polygon) and not p.is_empty]
 
 
 def _without_holes(polygon: Polygon) -> list[Polygon]:

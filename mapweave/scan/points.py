@@ -41,17 +41,17 @@ class OrientedPoints:
         return len(self.points)
 
     def moved(self, pose: FloatArray) -> "OrientedPoints":
-        """Return the same surface, given in the frame at `pose` (3,), in that frame's parent."""
+        """Return the same points, given in the frame at `pose` (3,), in that frame's parent."""
         normals: FloatArray = self.normals @ se2.rotation(pose[2]).T
         return OrientedPoints(se2.transform_points(pose, self.points), normals, self.polyline)
 
     def at(self, index: IntArray | BoolArray | slice) -> "OrientedPoints":
-        """Return the points selected by `index`."""
+        """Return the points that `index`, of numbers or a mask (n,), selects."""
         return OrientedPoints(self.points[index], self.normals[index], self.polyline[index])
 
 
 def join_points(oriented: list[OrientedPoints]) -> OrientedPoints:
-    """Return all points of `surfaces`, which share a frame."""
+    """Return all points of `oriented`, which share a frame."""
     return OrientedPoints(
         np.concatenate([s.points for s in oriented]),
         np.concatenate([s.normals for s in oriented]),
@@ -81,8 +81,12 @@ def scan_points(
 
     Parameters
     ----------
+    scan
+        One sweep.
+    segments
+        Its n segments.
     max_range
-        [m] farther returns are left out.
+        [m] beyond which returns are left out.
     spacing
         [m] that two neighbouring points on a segment are apart at the most, returns included.
     """
@@ -99,9 +103,19 @@ def scan_points(
 
 
 def points_on_lines(lines: LineMap, spacing: float) -> tuple[OrientedPoints, IntArray]:
-    """Return oriented points about every `spacing` [m] along the segments of `lines`.
+    """Return oriented points along the segments of a map.
 
-    The second value tells which segment each point is on; each has one at least.
+    Parameters
+    ----------
+    lines
+        The map; its frame is that of the points.
+    spacing
+        [m] between points, about; each segment has one at least.
+
+    Returns
+    -------
+    tuple of OrientedPoints and IntArray
+        The points, and (n,) which segment each is on.
     """
     segments = lines.segments
     directions = segments[:, 2:] - segments[:, :2]

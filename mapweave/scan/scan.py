@@ -16,7 +16,7 @@ UNNUMBERED = -1
 _TURN = 2 * math.pi
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class Scan:
     """One sweep of a 2D laser, in the sensor's frame: x ahead, y to the left.
 
@@ -54,28 +54,27 @@ class Scan:
 
     ranges: FloatArray
     angles: FloatArray
-    index: int = UNNUMBERED
-    stamp: float = math.nan
-    odometry: FloatArray | None = None
+    index: int
+    stamp: float
+    odometry: FloatArray | None
 
-    def __post_init__(self) -> None:
-        """Check and keep what was given."""
-        ranges = as_numbers("ranges", self.ranges, "expected (n,) distances [m]")
-        angles = as_numbers("angles", self.angles, "expected (n,) directions [rad]")
-        if ranges.ndim != 1:
-            raise ArgumentError("ranges", f"expected (n,) distances [m], got shape {ranges.shape}")
-        if angles.shape != ranges.shape:
-            raise ArgumentError(
-                "angles", f"expected ({len(ranges)},), one a range, got shape {angles.shape}"
-            )
-        if len(angles) > 1 and angles[0] > angles[-1]:
-            ranges, angles = ranges[::-1], angles[::-1]
-        _check_directions(angles)
-        keep = object.__setattr__  # the values are the class's own from here on
-        keep(self, "ranges", _read_only(np.where((ranges > 0) & (ranges < np.inf), ranges, np.nan)))
-        keep(self, "angles", _owned(angles))
-        if self.odometry is not None:
-            keep(self, "odometry", _pose("odometry", self.odometry))
+    def __init__(
+        self,
+        ranges: ArrayLike,
+        angles: ArrayLike,
+        index: int = UNNUMBERED,
+        stamp: float = math.nan,
+        odometry: ArrayLike | None = None,
+    ) -> None:
+        measured, directions = _ascending(*_of_one_length(ranges, angles))
+        _check_directions(directions)
+        returned = np.where((measured > 0) & (measured < np.inf), measured, np.nan)
+        keep = object.__setattr__  # only here: the instance is frozen
+        keep(self, "ranges", _read_only(returned))
+        keep(self, "angles", _owned(directions))
+        keep(self, "index", index)
+        keep(self, "stamp", stamp)
+        keep(self, "odometry", None if odometry is None else _pose("odometry", odometry))
 
     @classmethod
     def of(
@@ -124,8 +123,7 @@ class Scan:
         given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
         used = np.where((given >= range_min) & (given <= range_max), given, np.nan)
         angles = angle_min + angle_increment * np.arange(given.size, dtype=np.float64)
-        pose = None if odometry is None else _pose("odometry", odometry)
-        return cls(used, angles, index, stamp, pose)
+        return cls(used, angles, index, stamp, odometry)
 
     @property
     def hits(self) -> BoolArray:
@@ -140,16 +138,34 @@ class Scan:
         return points
 
 
+def _of_one_length(ranges: ArrayLike, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return both as (n,) arrays; ArgumentError if they are not."""
+    measured = as_numbers("ranges", ranges, "expected (n,) distances [m]")
+    directions = as_numbers("angles", angles, "expected (n,) directions [rad]")
+    if measured.ndim != 1:
+        raise ArgumentError("ranges", f"expected (n,) distances [m], got shape {measured.shape}")
+    if directions.shape != measured.shape:
+        raise ArgumentError(
+            "angles", f"expected ({len(measured)},), one a range, got shape {directions.shape}"
+        )
+    return measured, directions
+
+
+def _ascending(ranges: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return both in counter-clockwise order, if they were clockwise."""
+    clockwise = len(angles) > 1 and angles[0] > angles[-1]
+    return (ranges[::-1], angles[::-1]) if clockwise else (ranges, angles)
+
+
 def _check_directions(angles: FloatArray) -> None:
     """Raise ArgumentError unless `angles` (n,) [rad] ascend within a turn."""
     if len(angles) < 2:
         if not np.isfinite(angles).all():
             raise ArgumentError("angles", "expected finite directions [rad], got NaN or infinity")
         return
-    steps = angles[1:] - angles[:-1]
-    if not (steps > 0).all():  # so it is where one of them is NaN
-        _refuse_directions(angles)
     span = float(angles[-1] - angles[0])
+    if not ((angles[1:] > angles[:-1]).all() and math.isfinite(span)):  # nor where one is NaN
+        _refuse_directions(angles)
     # A turn of beams whose stated increment was rounded may end up to a beam late.
     if not span <= _TURN + span / (len(angles) - 1) * (1 + 1e-6):
         raise ArgumentError(

@@ -8,23 +8,22 @@ in beam order has the sensor, and with it the visible side, on its left.
 
 from dataclasses import dataclass
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.kernels import segmentation
-from mapweave.kernels.segmentation import SegmentationSettings, fit_segment
+from mapweave.kernels.segmentation import SegmentationSettings
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.scan import Scan
 
-__all__ = ["ScanSegments", "SegmentationParameters", "extract_segments", "fit_segment"]
 
-
-class SegmentationParameters(BaseModel):
+class SegmentationParameters(StageParameters):
     """How returns become segments."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    max_range: float = Field(
-        30.0, gt=0, description="[m] farther returns are left out: their spacing hides the shape"
+    max_range: float = derived(
+        lambda c: 1.2 * c.mapping.far_range,
+        gt=0,
+        description="[m] farther returns are left out: their spacing hides the shape",
     )
     max_jump: float = Field(
         0.25, gt=0, description="[m] between neighbouring returns of one surface, at close range"
@@ -35,8 +34,10 @@ class SegmentationParameters(BaseModel):
         description="[rad] flattest angle at which a beam still meets a surface: neighbouring"
         " returns of one surface lie at most range x spacing / sin(grazing) apart",
     )
-    tolerance: float = Field(
-        0.04, gt=0, description="[m] largest deviation of a return from its segment (SICK: 1-2 cm)"
+    tolerance: float = derived(
+        lambda c: 2 * c.sensor.range_sigma,
+        gt=0,
+        description="[m] largest deviation of a return from its segment (SICK: 1-2 cm)",
     )
     relative_tolerance: float = Field(
         0.004, ge=0, description="[m/m] what the tolerance grows with range"
@@ -62,7 +63,27 @@ class ScanSegments:
 
 
 def extract_segments(scan: Scan, parameters: SegmentationParameters | None = None) -> ScanSegments:
-    """Approximate the returns of `scan` by directed line segments (paper, V, first step)."""
+    """Approximate the returns of `scan` by directed line segments (paper, V, first step).
+
+    Parameters
+    ----------
+    scan
+        The scan; beams that did not come back belong to no segment.
+    parameters
+        How returns become segments.
+
+    Returns
+    -------
+    ScanSegments
+        In the sensor's frame [m], in beam order, with the segment of each beam.
+
+    Examples
+    --------
+    >>> angles = np.linspace(-0.5, 0.5, 60)
+    >>> wall = Scan(2 / np.cos(angles), angles)  # 2 m ahead, seen from the origin
+    >>> extract_segments(wall).segments.round(2)
+    array([[ 2.  , -1.09,  2.  ,  1.09]])
+    """
     p = parameters or SegmentationParameters()
     settings = SegmentationSettings(
         p.max_range,
@@ -74,3 +95,19 @@ def extract_segments(scan: Scan, parameters: SegmentationParameters | None = Non
         p.min_length,
     )
     return ScanSegments(*segmentation.extract_segments(scan.angles, scan.ranges, settings))
+
+
+def fit_segment(points: FloatArray) -> FloatArray:
+    """Return the segment that fits points best by total least squares.
+
+    Parameters
+    ----------
+    points
+        (k, 2) [m], k at least 2, in beam order.
+
+    Returns
+    -------
+    FloatArray
+        (4,) x1 y1 x2 y2 [m], directed as the points come.
+    """
+    return segmentation.fit_segment(points)

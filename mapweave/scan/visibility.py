@@ -11,6 +11,13 @@ def clear_ranges(scan: Scan, max_range: float) -> FloatArray:
 
     The neighbours count because space between two beams is only known to be free as far as both
     reach. A beam that did not come back proves nothing (glass, black cloth): 0.
+
+    Parameters
+    ----------
+    scan
+        One sweep.
+    max_range
+        [m] beyond which a beam proves nothing.
     """
     reach = np.minimum(scan.ranges, max_range)
     reach[np.isnan(reach)] = 0.0
@@ -26,6 +33,10 @@ def seen_through(
 
     Parameters
     ----------
+    scan
+        One sweep.
+    points
+        (n, 2) [m], sensor frame.
     margin
         [m] how much nearer than what the beam hit a point must be: scalar or (n,).
     max_range

@@ -53,7 +53,15 @@ class Corners:
 
 
 def find_corners(segments: FloatArray, parameters: CornerParameters) -> Corners:
-    """Return the corners of (n, 4) directed `segments` [m]."""
+    """Return the corners of a map: pairs of walls that fix a frame.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    parameters
+        Which pairs make a corner.
+    """
     p = parameters
     vectors = segments[:, 2:] - segments[:, :2]
     lengths = np.hypot(vectors[:, 0], vectors[:, 1])
@@ -72,7 +80,21 @@ def find_corners(segments: FloatArray, parameters: CornerParameters) -> Corners:
 
 
 def propose(reference: Corners, other: Corners, parameters: CornerParameters) -> FloatArray:
-    """Return (k, 3) transforms from `other` to `reference`, the most proposed first."""
+    """Return the transforms that lay like corners of two maps on each other.
+
+    Parameters
+    ----------
+    reference, other
+        Corners of two maps, each in its own frame.
+    parameters
+        Which corners are alike, and which proposals are counted as one.
+
+    Returns
+    -------
+    FloatArray
+        (k, 3) from the frame of `other` to that of `reference` [m, m, rad], the most proposed
+        first.
+    """
     p = parameters
     apart = se2.wrap(reference.angle[:, None] - other.angle[None, :])
     i, j = np.nonzero(np.abs(apart) <= p.angle_tolerance)

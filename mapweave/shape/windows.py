@@ -192,7 +192,17 @@ def _starts(
 def all_windows(
     segments: FloatArray, polyline: IntArray, parameters: WindowParameters
 ) -> tuple[Windows, ...]:
-    """Return a map's windows of every arc length of the parameters; arguments as for `windows`."""
+    """Return a map's windows of every arc length of the parameters.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], polyline by polyline, in order.
+    polyline
+        (n,) the polyline of each, ascending.
+    parameters
+        Arc lengths, samples and stride.
+    """
     return tuple(
         windows(segments, polyline, length, parameters.samples, parameters.stride * length)
         for length in parameters.lengths

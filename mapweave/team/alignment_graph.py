@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.fusion.extrapolation import ExtrapolationParameters, bend
 from mapweave.geometry import se2
@@ -18,6 +18,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.maps import Alignment
 from mapweave.matching.distance_field import DistanceField
+from mapweave.parameters import StageParameters, derived
 from mapweave.reasons import Pair, Reason, ReasonKind, Status, StatusKind
 from mapweave.team.consistency import ConsistencyParameters, bits, explain
 from mapweave.team.contradictions import (
@@ -31,13 +32,11 @@ from mapweave.team.inliers import component_confidence, part_right, rely, weakes
 from mapweave.team.min_cut import groups
 
 
-class AlignmentGraphParameters(BaseModel):
+class AlignmentGraphParameters(StageParameters):
     """How alignments are weighed against each other, and the poses fitted to them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     explanations: ConsistencyParameters = ConsistencyParameters()
-    contradictions: ContradictionParameters = ContradictionParameters()
+    contradictions: ContradictionParameters = derived(ContradictionParameters.of)
     reach: ExtrapolationParameters = ExtrapolationParameters()
     sigma: float = Field(0.1, gt=0, description="[m] of an alignment's translation")
     turn_sigma: float = Field(0.01, gt=0, description="[rad] of an alignment's rotation")
@@ -97,7 +96,7 @@ class _Graph:
     ) -> None:
         self._names, self._parameters = names, parameters
         self._number = {name: number for number, name in enumerate(names)}
-        self._middles = np.array([_middle(rasters.get(name)) for name in names])
+        self._middles = np.array([_frame_at_middle(rasters.get(name)) for name in names])
         links = [a for a in alignments if a.decision == "accepted" and a.reference != a.other]
         # In an order of their own, so that the order in which they came changes nothing.
         links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
@@ -239,7 +238,7 @@ def _covariance(edge: Edge, p: AlignmentGraphParameters) -> FloatArray:
     return np.diag([squared, squared, p.turn_sigma**2])
 
 
-def _middle(raster: DistanceField | None) -> FloatArray:
+def _frame_at_middle(raster: DistanceField | None) -> FloatArray:
     """(3,) frame at the middle of a map's wall; the map's own where it has seen none."""
     x, y = raster.oriented.points.mean(axis=0) if raster else (0.0, 0.0)
     return np.array([x, y, 0.0])

@@ -8,7 +8,7 @@ probability follows from three assumptions:
 - right ones agree always.
 
 So the log of an explanation's weight is the sum of the log odds of those that are right, and
--log(chance) for every independent cycle that they close: |right| - |nodes| + |parts|. Majority
+-log(chance) for every independent cycle that they close: #right - #nodes + #parts. Majority
 and confidence are in it both, and no alignment, however sure, outweighs a cycle that agrees.
 What else speaks against an explanation, such as walls where others saw through, is doubt that
 costs as much.

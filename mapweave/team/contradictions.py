@@ -9,17 +9,18 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import Verdict, VerificationParameters, verify
+from mapweave.parameters import StageParameters, derived
 from mapweave.team.cycles import Edge, poses_along
 from mapweave.team.min_cut import groups
 
 
-class ContradictionParameters(BaseModel):
+class ContradictionParameters(StageParameters):
     """How much contradiction is to be expected, and what more of it means.
 
     Of some 90 pairs of stretches of the Intel, Seattle, CSAIL and Freiburg logs at their true
@@ -27,9 +28,7 @@ class ContradictionParameters(BaseModel):
     than 2 m (CSAIL) to 57 m (Freiburg).
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    verification: VerificationParameters = VerificationParameters()
+    verification: VerificationParameters = derived(VerificationParameters.of)
     allowance: float = Field(
         0.25,
         ge=0,

@@ -2,15 +2,17 @@
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 from shapely.geometry.base import BaseGeometry
 
+from mapweave.config import Config
 from mapweave.errors import ArgumentError
-from mapweave.fusion.align import align
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
 from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.polylines import group_polylines
 from mapweave.lines.simplification import SimplificationParameters, simplify, sources
@@ -19,11 +21,13 @@ from mapweave.maps import (
     JointComponent,
     JointMap,
     LineMap,
+    MadeWith,
     RobotMap,
     lines_of,
     submaps_by_component,
 )
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, unite
 from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster, cluster_components
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
@@ -32,21 +36,27 @@ from mapweave.team.segment_confidence import SegmentConfidenceParameters, segmen
 Weave: TypeAlias = Callable[[Cluster, Sequence[Alignment]], tuple[Cluster, Mapping[str, LineMap]]]
 
 
-class JointParameters(BaseModel):
+class JointParameters(StageParameters):
     """How robots' maps become one."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    graph: AlignmentGraphParameters = derived(AlignmentGraphParameters.of)
+    merging: MergingParameters = derived(
+        lambda c: MergingParameters.of(c, max_step=0.25, max_cost=0.2)
+    )
+    simplification: SimplificationParameters = derived(SimplificationParameters.of)
+    free_space: FreeSpaceParameters = derived(FreeSpaceParameters.of)
+    raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)
+    max_gap: float = derived(
+        lambda c: c.mapping.max_gap, gt=0, description="[m] within a generalized polyline"
+    )
+    segments: SegmentConfidenceParameters = derived(SegmentConfidenceParameters.of)
 
-    graph: AlignmentGraphParameters = AlignmentGraphParameters()
-    merging: MergingParameters = MergingParameters(max_step=0.25, max_cost=0.2)
-    simplification: SimplificationParameters = SimplificationParameters()
-    free_space: FreeSpaceParameters = FreeSpaceParameters()
-    raster: DistanceFieldParameters = DistanceFieldParameters()
-    max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
-    segments: SegmentConfidenceParameters = SegmentConfidenceParameters()
 
-
-def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None) -> JointMap:
+def fuse(
+    maps: Sequence[RobotMap],
+    alignments: Sequence[Alignment] | None = None,
+    config: Config | None = None,
+) -> JointMap:
     """Return the joint map of robots whose maps are complete: nothing grows any more.
 
     Parameters
@@ -55,6 +65,8 @@ def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None
         Of one robot each.
     alignments
         As of `mapweave.align`, of any of their pairs; by default all pairs are compared here.
+    config
+        What the joint map is made with, and says so; by default the default one.
 
     Returns
     -------
@@ -72,14 +84,17 @@ def fuse(maps: Sequence[RobotMap], alignments: Sequence[Alignment] | None = None
     >>> fuse([RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ())]).components
     ()
     """
+    config = config or Config()
     _check_robots(maps)
     if alignments is None:
         pairs = itertools.combinations(maps, 2)
-        alignments = [a for first, second in pairs for a in align(first, second)]
+        p = FusionParameters.of(config)
+        alignments = [a for first, second in pairs for a in align(first, second, p)]
     _check_components(maps, alignments)
     # Nothing grows any more, and there is no next time.
-    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1_000_000))
-    return build_team_map(maps, alignments, 1, weaver)
+    weaver = JointOptimizer(JointOptimizationParameters.of(config, newest=True, at_once=1_000_000))
+    joint = build_team_map(maps, alignments, 1, weaver, JointParameters.of(config))
+    return replace(joint, made_with=MadeWith.of(config))
 
 
 def _check_robots(maps: Sequence[RobotMap]) -> None:
@@ -131,7 +146,11 @@ def build_joint_map(
 
 
 def build_team_map(
-    maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int, weaver: JointOptimizer
+    maps: Sequence[RobotMap],
+    alignments: Sequence[Alignment],
+    version: int,
+    weaver: JointOptimizer,
+    parameters: JointParameters | None = None,
 ) -> JointMap:
     """Return what the team knows, its robots' submaps woven together."""
     submaps = submaps_by_component(maps)
@@ -140,6 +159,7 @@ def build_team_map(
         lines,
         alignments,
         version,
+        parameters,
         weave=lambda cluster, judged: weaver.weave(cluster, submaps, judged),
     )
 
@@ -169,7 +189,7 @@ def _join(
     everything = LineMap.union(placed)
     free = unite([from_rings(everything.free_space)], p.free_space)
     walls = _merged(everything, free, p)
-    wall, source = sources(walls, everything.segments)
+    wall, source = sources(walls, everything.segments, p.simplification)
     support = np.bincount(wall, everything.support[source], minlength=len(walls))
     order, polyline = group_polylines(walls, p.max_gap)
     lines = LineMap(
@@ -184,6 +204,5 @@ def _join(
 def _merged(everything: LineMap, free: BaseGeometry, p: JointParameters) -> FloatArray:
     """Return (n, 4) the walls of all submaps, merged (paper, VI) and simplified."""
     seen, support = everything.segments, everything.support
-    lengths = np.hypot(*(seen[:, 2:] - seen[:, :2]).T)
-    merged = evolve(seen, lengths * support, p.merging).segments
+    merged = evolve(seen, lengths(seen) * support, p.merging).segments
     return simplify(merged, seen, support, free, p.simplification)

@@ -13,23 +13,24 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle
+from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle_of_path
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.mapping.submap_graph import joining_covariance, tracking_covariance
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory, lines_of
+from mapweave.parameters import StageParameters, derived
 from mapweave.team.alignment_graph import Cluster
 
 
-class JointOptimizationParameters(BaseModel):
+class JointOptimizationParameters(StageParameters):
     """Which submaps are compared, and what alignments are worth beside that."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    loops: LoopParameters = LoopParameters(min_drift=0.9, min_turn=0.1, remembered=512)
+    loops: LoopParameters = derived(
+        lambda c: LoopParameters.of(c, min_drift=0.9, min_turn=0.1, remembered=512)
+    )
     candidates: int = Field(2, ge=1, description="submaps of each component compared, the nearest")
     most: int = Field(6, ge=1, description="submaps compared with one in all, the nearest")
     reach: float = Field(8.0, gt=0, description="[m] between the middles of submaps compared")
@@ -61,7 +62,8 @@ class _Node:
     @classmethod
     def of(cls, component: str, frame: FloatArray, submap: Submap) -> "_Node":
         placed = replace(submap, pose=se2.compose(frame, submap.pose))
-        x, y = middle(placed).tolist() if len(submap.trajectory.pose) else placed.pose[:2].tolist()
+        driven = len(submap.trajectory.pose) > 0
+        x, y = (middle_of_path(placed) if driven else placed.pose[:2]).tolist()
         return cls(component, placed, (x, y))
 
 

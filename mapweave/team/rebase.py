@@ -54,8 +54,8 @@ def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
     theirs = _then(other, alignment.other)
     if not ours or not theirs:
         return alignment
-    here = np.array([_middle(*each) for each in ours])
-    there = np.array([_middle(*each) for each in theirs])
+    here = np.array([_middle_then(*each) for each in ours])
+    there = np.array([_middle_then(*each) for each in theirs])
     there = se2.transform_points(alignment.transform, there)
     apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
     i, j = np.unravel_index(np.argmin(apart), apart.shape)
@@ -99,7 +99,7 @@ def _span(submap: Submap) -> tuple[int | None, int | None]:
     return (int(indices[0]), int(indices[-1])) if len(indices) else (None, None)
 
 
-def _middle(then: SubmapPlace, now: Submap) -> FloatArray:
+def _middle_then(then: SubmapPlace, now: Submap) -> FloatArray:
     """(2,) middle of a submap's wall [m], where it was then in its component."""
     ends = now.map.segments.reshape(-1, 2)
     middle = ends.mean(axis=0) if len(ends) else np.zeros(2)

@@ -3,23 +3,29 @@
 from collections.abc import Sequence
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, points_on_lines
 
 
-class SegmentConfidenceParameters(BaseModel):
+class SegmentConfidenceParameters(StageParameters):
     """When a map confirms a wall, and when it denies it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    spacing: float = Field(0.2, gt=0, description="[m] between samples of a wall")
-    closeness: float = Field(0.3, gt=0, description="[m] to a wall of its own, to confirm")
-    clearance: float = Field(0.3, gt=0, description="[m] inside its free space, to deny")
+    spacing: float = derived(
+        lambda c: 2 * c.mapping.resolution, gt=0, description="[m] between samples of a wall"
+    )
+    closeness: float = derived(
+        lambda c: 1.2 * c.mapping.closeness,
+        gt=0,
+        description="[m] to a wall of its own, to confirm",
+    )
+    clearance: float = derived(
+        lambda c: c.mapping.clearance, gt=0, description="[m] inside its free space, to deny"
+    )
 
 
 def segment_confidence(

@@ -84,6 +84,18 @@ def test_what_the_one_who_is_gone_had_compared_is_not_compared_again() -> None:
     assert second.begin(0.0) is not None
 
 
+def test_what_was_found_of_our_run_before_this_one_spares_us_nothing() -> None:
+    before, now = plan_of(FIRST, SECOND), plan_of(SECOND, FIRST)
+    comparison = before.begin(0.0)
+    assert comparison is not None
+    now.own_map(a_map(SECOND, 1, boot="later"), finished=False)
+    now.learned(found(comparison, FIRST, alignment("accepted")))
+    now.peer_gone(FIRST, "x")
+    anew = now.begin(0.0)
+    assert anew is not None
+    assert not now.have_met(anew)
+
+
 def test_the_same_versions_are_compared_once() -> None:
     plan = plan_of(FIRST, SECOND)
     comparison = plan.begin(0.0)

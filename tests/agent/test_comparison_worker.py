@@ -4,10 +4,11 @@ import operator
 import os
 import signal
 import time
+from functools import partial
 
 import numpy as np
 
-from mapweave.fusion.align import align
+from mapweave.fusion.align import FusionParameters, align
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave_agent.comparison_schedule import Comparison
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
@@ -43,6 +44,15 @@ def test_what_comes_back_is_what_the_function_returns() -> None:
     assert outcome.alignments is not None
     (alignment,) = outcome.alignments
     assert (alignment.decision, alignment.reason) == (expected.decision, expected.reason)
+
+
+def test_a_function_takes_its_parameters_along() -> None:
+    demanding = partial(align, parameters=FusionParameters(min_wall=77.0))
+    with ComparisonWorker(demanding) as comparer:
+        comparer.start(COMPARISON)
+        outcome = outcome_of(comparer)
+    assert outcome.alignments is not None
+    assert [a.reason for a in outcome.alignments] == ["a/0 has less than 77 m of wall to compare"]
 
 
 def test_an_error_is_an_outcome_and_the_next_comparison_goes_on() -> None:

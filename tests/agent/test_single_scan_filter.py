@@ -32,7 +32,7 @@ def test_a_component_of_one_scan_is_left_out() -> None:
 
 
 def test_a_submap_of_one_scan_among_others_of_its_component_stays() -> None:
-    assert ids(robot_map((0, 9), (0, 1))) == [0, 1]
+    assert ids(robot_map((0, 9), (0, 1), (1, 5))) == [0, 1, 2]
 
 
 def test_two_scans_that_fit_each_other_stay() -> None:

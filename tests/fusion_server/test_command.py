@@ -1,10 +1,14 @@
-"""What `mapweave server` refuses before it connects to anything."""
+"""What `mapweave server` makes of its arguments before it connects to anything."""
 
+from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from mapweave.cli import main
+from mapweave.config import Config, Mapping
+from mapweave_fusion_server import command
 
 
 def test_a_file_that_is_no_store_ends_the_command_with_one_line(
@@ -34,3 +38,14 @@ def test_an_interval_that_is_none_is_wrong_usage(
         main(["server", "--min-interval", interval])
     assert ended.value.code == 2
     assert "_seconds" not in capsys.readouterr().err
+
+
+def test_the_service_gets_the_configuration(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service = Mock()
+    monkeypatch.setattr(command, "open_session", Mock(return_value=nullcontext()))
+    monkeypatch.setattr(command, "Service", service)
+    monkeypatch.setenv("MAPWEAVE_MAPPING_MAX_GAP", "0.7")
+    assert main(["server", "--store", str(tmp_path / "store")]) == 0
+    assert Config(mapping=Mapping(max_gap=0.7)) in service.call_args.args

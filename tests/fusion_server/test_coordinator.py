@@ -99,6 +99,19 @@ def test_joining_and_parting_do_not_wait(
     assert _decisions(_make_version(coordinator)) == [after]
 
 
+def test_a_join_does_not_wait_for_the_growth_that_comes_after_it(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator(min_interval=1e6)
+    a, b = make_map("a"), make_map("b")
+    for robot_map in (a, b):
+        coordinator.receive_map(robot_map)
+    _make_version(coordinator)
+    coordinator.receive_alignments(make_alignments(a, b))
+    coordinator.receive_map(make_map("a", 2))
+    assert coordinator.seconds_until_due(0.0) == 0.0
+
+
 def test_a_moved_transform_waits_for_the_interval(
     make_map: MakeMap, make_alignments: MakeAlignments
 ) -> None:

@@ -49,6 +49,31 @@ def test_help_lists_every_command_with_its_summary(capsys: pytest.CaptureFixture
     assert said.err == ""
 
 
+def test_help_imports_no_command_and_nothing_that_is_slow_to_load() -> None:
+    code = "import sys\nfrom mapweave.cli import main\nmain(['--help'])\nprint(*sys.modules)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(told.stdout.split())
+    assert loaded.isdisjoint({"numpy", "scipy", "gtsam", "zenoh", "pydantic", "rich"})
+    assert loaded.isdisjoint(point.module for point in entry_points(group=cli.COMMAND_GROUP))
+
+
+@pytest.mark.parametrize("command", ["Command('Try' + ' it.', None, run)", "make()"])
+def test_a_summary_that_the_source_does_not_state_is_looked_up(
+    command: str,
+    offer: Callable[[str], None],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    offer("return 0")
+    tried = tmp_path / "tried.py"
+    stated = "command = Command('Try it.', lambda parser: None, run)"
+    source = tried.read_text().replace(stated, f"make = lambda: {stated[10:]}\ncommand = {command}")
+    tried.write_text(source)
+    assert main(["--help"]) == 0
+    assert "  try      Try it.\n" in capsys.readouterr().out
+    assert "tried" in sys.modules
+
+
 def test_without_a_command_the_overview_goes_to_standard_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -65,6 +65,8 @@ class Plan:
         The coordinator's file.
     timeout
         When to give up [s]; None never does.
+    config
+        The file that says what to change of the defaults, for agents and coordinator; or None.
     """
 
     team: str
@@ -73,6 +75,7 @@ class Plan:
     listen: str
     store: Path
     timeout: float | None
+    config: Path | None = None
 
     @property
     def robots(self) -> list[str]:
@@ -83,6 +86,11 @@ class Plan:
     def connection(self) -> list[str]:
         """The arguments that every process of the team but the router takes."""
         return ["--team", self.team, "--connect", self.listen]
+
+    @property
+    def computing(self) -> list[str]:
+        """The arguments that every process takes that computes."""
+        return [] if self.config is None else ["--config", str(self.config)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,7 +138,7 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
     ):
         start_server(crew, plan, plan.store)
         for member in plan.members:
-            _start_agent(crew, plan, member)
+            start_agent(crew, plan, member)
         while not is_done(plan.robots, recorder.statuses):
             _follow(crew, inbox, recorder, display)
             _check_time(plan, deadline, _unfinished(plan, recorder))
@@ -159,14 +167,18 @@ def start_router(crew: ProcessGroup, plan: Plan) -> None:
 
 def start_server(crew: ProcessGroup, plan: Plan, store: Path) -> None:
     """Start the coordinator on `store`."""
-    crew.start("server", SERVER, ["server", *plan.connection, "--store", str(store)])
+    crew.start(
+        "server", SERVER, ["server", *plan.connection, *plan.computing, "--store", str(store)]
+    )
 
 
-def _start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
+def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
+    """Start the agent of `member` on its part of the log."""
     first, behind_last = member.scans
     scans = ["--scans", f"{first}:{behind_last}"]
     source = ["--robot", member.robot, "--log", str(member.log), "--rate", plan.rate]
-    crew.start(f"agent {member.robot}", AGENT, ["agent", *source, *scans, *plan.connection])
+    arguments = ["agent", *source, *scans, *plan.connection, *plan.computing]
+    crew.start(f"agent {member.robot}", AGENT, arguments)
 
 
 def _listens(host: str, port: int) -> bool:

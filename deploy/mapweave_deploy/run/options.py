@@ -4,7 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
-from mapweave.cli import argument, positive
+from mapweave.cli import add_config_argument, argument, positive
 from mapweave_deploy.sim.simulation import BUILDERS
 from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import MAX_PORT
@@ -77,6 +77,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="give up after S seconds (default: never)",
     )
+    add_config_argument(parser)
     parser.add_argument(
         "--stay",
         action="store_true",

@@ -44,8 +44,26 @@ class RobotLog:
     tour: Tour
 
 
-def simulate(world: str, robots: int, seed: int, folder: Path) -> list[RobotLog]:
+def simulate(
+    world: str = "office", robots: int = 2, seed: int = 1, folder: str | Path = "logs"
+) -> list[RobotLog]:
     """Write ``r1.log``, ``r1-truth.json``, … into `folder`; the same seed gives the same bytes.
+
+    Parameters
+    ----------
+    world
+        ``office`` or ``arena``.
+    robots
+        How many, each with a tour of its own.
+    seed
+        Of the world, the tours and the noise.
+    folder
+        Made where it is missing.
+
+    Returns
+    -------
+    list of RobotLog
+        One a robot.
 
     Raises
     ------
@@ -56,9 +74,10 @@ def simulate(world: str, robots: int, seed: int, folder: Path) -> list[RobotLog]
         raise MapweaveError(f"no world {world!r}; there are {', '.join(BUILDERS)}")
     place = BUILDERS[world](seed)
     tours = plan_tours(place, robots, TOURS[world], np.random.default_rng([seed, robots]))
-    folder.mkdir(parents=True, exist_ok=True)
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
     return [
-        _write(place, f"r{number}", tour, seed, number, folder)
+        _write(place, f"r{number}", tour, seed, number, target)
         for number, tour in enumerate(tours, start=1)
     ]
 

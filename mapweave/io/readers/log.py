@@ -22,6 +22,7 @@ def read_scans(
     path: str | Path,
     *,
     odometry: bool = False,
+    angular_step: float | None = None,
     on_warning: Callable[[str], None] = warnings.warn,
 ) -> Iterator[Scan]:
     """Return the whole scans of a log, in the order of its lines, as they are read.
@@ -39,6 +40,9 @@ def read_scans(
     odometry
         Fill `Scan.odometry` with the robot pose that the line states, where it is finite. (A log
         that another program has corrected states the corrected pose there, too.)
+    angular_step
+        Between beams [rad], where a line does not state it (``FLASER``); None has the number of
+        beams tell.
     on_warning
         Called once, after the last scan, if damaged lines were left out; by default a
         `UserWarning` says so.
@@ -51,10 +55,10 @@ def read_scans(
     """
     source = Path(path)
     check_is_file(source)
-    return _scans(source, odometry, on_warning)
+    return _scans(source, odometry, angular_step, on_warning)
 
 
-def count_scans(path: str | Path) -> int:
+def count_scans(path: str | Path, angular_step: float | None = None) -> int:
     """Return how many scans `read_scans` yields: about a second for ten thousand.
 
     Raises
@@ -62,7 +66,7 @@ def count_scans(path: str | Path) -> int:
     FileError
         As `read_scans` does.
     """
-    return sum(1 for _ in read_scans(path, on_warning=lambda _: None))
+    return sum(1 for _ in read_scans(path, angular_step=angular_step, on_warning=lambda _: None))
 
 
 def check_is_file(path: Path) -> None:
@@ -142,13 +146,15 @@ class _Tally:
         return "holds no laser scan" if self.lines else "is empty"
 
 
-def _scans(path: Path, odometry: bool, on_warning: Callable[[str], None]) -> Iterator[Scan]:
+def _scans(
+    path: Path, odometry: bool, angular_step: float | None, on_warning: Callable[[str], None]
+) -> Iterator[Scan]:
     tally = _Tally()
     try:
         for line in read_lines(path):
             tally.lines += 1
             try:
-                record = parse_line(line)
+                record = parse_line(line, angular_step)
             except DamagedLineError as error:
                 tally.add_damaged(line, error)
                 continue
@@ -167,8 +173,10 @@ def _scan(index: int, record: LaserRecord, odometry: bool) -> Scan:
     return Scan(record.ranges, record.angles, index, record.stamp, guess)
 
 
-def parse_line(line: Line) -> LaserRecord | None:
+def parse_line(line: Line, angular_step: float | None = None) -> LaserRecord | None:
     """Return the scan that `line` holds; None if it is a line of another kind.
+
+    `angular_step` is that of `read_scans`.
 
     Raises
     ------
@@ -181,7 +189,7 @@ def parse_line(line: Line) -> LaserRecord | None:
     if not words:
         return None
     if words[0] in SCAN_KINDS or _starts_a_kind(words):
-        return parse_record(words)
+        return parse_record(words, angular_step)
     if not _MESSAGE_NAME.match(words[0]):
         raise _ForeignLineError("does not start with the name of a message")
     return None

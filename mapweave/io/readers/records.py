@@ -71,8 +71,14 @@ class LaserRecord:
     stamp: float
 
 
-def parse_record(words: list[bytes]) -> LaserRecord:
+def parse_record(words: list[bytes], angular_step: float | None = None) -> LaserRecord:
     """Return what the words of a line whose first is in `SCAN_KINDS` say.
+
+    Parameters
+    ----------
+    angular_step
+        Between beams [rad], where the line does not state it (``FLASER``); None has the number of
+        beams tell.
 
     Raises
     ------
@@ -80,16 +86,16 @@ def parse_record(words: list[bytes]) -> LaserRecord:
         If a word is missing, left over, or not the number it should be.
     """
     if words[0] == b"FLASER":
-        return _parse_flaser(words)
+        return _parse_flaser(words, angular_step)
     return _parse_robotlaser(words)
 
 
-def _parse_flaser(words: list[bytes]) -> LaserRecord:
+def _parse_flaser(words: list[bytes], angular_step: float | None) -> LaserRecord:
     count = _count(words, 1, "beams")
     _check_length(words, 2 + count + _FLASER_TAIL)
     poses = _numbers(words[2 + count : 8 + count])
     return LaserRecord(
-        angles=_flaser_angles(count),
+        angles=_flaser_angles(count, angular_step),
         ranges=without_no_returns(_numbers(words[2 : 2 + count]), FARTHEST_READING),
         laser_pose=poses[:3],
         robot_pose=poses[3:],
@@ -168,10 +174,15 @@ def beam_angles(start: float, resolution: float, count: int) -> FloatArray:
     return angles
 
 
-def _flaser_angles(count: int) -> FloatArray:
-    """Return the directions of the beams of a ``FLASER``, which states only how many there are."""
+def _flaser_angles(count: int, step: float | None = None) -> FloatArray:
+    """Return the directions of the beams of a ``FLASER``, which states only how many there are.
+
+    They look ahead in the middle; where `step` [rad] between them is known, that is all it takes.
+    """
     if count < 2:
         raise DamagedLineError(f"FLASER has {count} beams, expected two or more")
+    if step is not None:
+        return beam_angles(-(count - 1) * step / 2, step, count)
     resolution = _FLASER_RESOLUTION.get(count, math.pi / (count - 1))
     # 180 and 360 beams are 181 and 361 whose last one, at +90°, was not sent.
     start = -math.pi / 2 if count in (180, 360) else -(count - 1) * resolution / 2

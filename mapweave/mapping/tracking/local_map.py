@@ -7,7 +7,7 @@ and known surfaces that the new scan sees through, speak against it.
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
@@ -15,23 +15,26 @@ from mapweave.kernels.point_map import make_point_map
 from mapweave.kernels.viewpoints import make_viewpoints
 from mapweave.matching.correlative import CorrelativeParameters, LikelihoodField, search
 from mapweave.matching.icp import CELL, IcpParameters, Target
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints
 from mapweave.scan.scan import Scan
 from mapweave.scan.visibility import beam_spacing, clear_ranges
 
 
-class LocalMapParameters(BaseModel):
+class LocalMapParameters(StageParameters):
     """What is remembered, and when it speaks for or against a pose."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    icp: IcpParameters = IcpParameters()
-    search: CorrelativeParameters = CorrelativeParameters()
+    icp: IcpParameters = derived(IcpParameters.of)
+    search: CorrelativeParameters = derived(CorrelativeParameters.of)
     keyframes: int = Field(60, ge=1, description="how many are remembered: some 15-20 m of path")
-    keyframe_step: float = Field(0.3, gt=0, description="[m] of motion that makes a new one")
-    keyframe_turn: float = Field(0.26, gt=0, description="[rad] of rotation that makes one: 15°")
-    thin: float = Field(
-        0.02,
+    keyframe_step: float = derived(
+        lambda c: c.mapping.keyframe_step, gt=0, description="[m] of motion that makes a new one"
+    )
+    keyframe_turn: float = derived(
+        lambda c: c.mapping.keyframe_turn, gt=0, description="[rad] of rotation that makes one: 15°"
+    )
+    thin: float = derived(
+        lambda c: c.sensor.range_sigma,
         ge=0,
         description="[m] within which a point is one that was seen before: a laser's noise",
     )
@@ -39,11 +42,25 @@ class LocalMapParameters(BaseModel):
         3, ge=1, description="one in so many known points tells what was seen through"
     )
     witnesses: int = Field(12, ge=1, description="nearest keyframes asked what they saw through")
-    overlap: float = Field(0.15, gt=0, description="[m] within which a return is explained")
-    clearance: float = Field(0.3, gt=0, description="[m] by which seeing through must be certain")
-    sight: float = Field(12.0, gt=0, description="[m] up to which seeing through counts")
-    far_sight: float = Field(
-        25.0, gt=0, description="[m] the same for a surface that faces the sensor: a corridor's end"
+    overlap: float = derived(
+        lambda c: 0.6 * c.mapping.closeness,
+        gt=0,
+        description="[m] within which a return is explained",
+    )
+    clearance: float = derived(
+        lambda c: c.mapping.clearance,
+        gt=0,
+        description="[m] by which seeing through must be certain",
+    )
+    sight: float = derived(
+        lambda c: 1.2 * c.mapping.free_range,
+        gt=0,
+        description="[m] up to which seeing through counts",
+    )
+    far_sight: float = derived(
+        lambda c: c.mapping.far_range,
+        gt=0,
+        description="[m] the same for a surface that faces the sensor: a corridor's end",
     )
     facing: float = Field(
         0.7,

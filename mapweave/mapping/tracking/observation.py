@@ -1,29 +1,39 @@
 """A scan, prepared: its lines, grouped into generalized polylines, and its oriented points."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.lines.polylines import group_polylines
 from mapweave.maps import LineMap
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, join_points, scan_points
 from mapweave.scan.scan import Scan
 from mapweave.scan.segmentation import ScanSegments, SegmentationParameters, extract_segments
 
 
-class ObservationParameters(BaseModel):
+class ObservationParameters(StageParameters):
     """What is used of a scan."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    segments: SegmentationParameters = SegmentationParameters()
-    max_gap: float = Field(0.5, gt=0, description="[m] within a generalized polyline")
-    spacing: float = Field(0.2, gt=0, description="[m] between points on walls, at the most")
-    sight: float = Field(
-        25.0,
+    max_range: float = derived(
+        lambda c: math.inf if c.sensor.max_range is None else c.sensor.max_range,
+        gt=0,
+        description="[m] readings at or beyond it are no returns",
+    )
+    segments: SegmentationParameters = derived(SegmentationParameters.of)
+    max_gap: float = derived(
+        lambda c: c.mapping.max_gap, gt=0, description="[m] within a generalized polyline"
+    )
+    spacing: float = derived(
+        lambda c: 2 * c.mapping.resolution,
+        gt=0,
+        description="[m] between points on walls, at the most",
+    )
+    sight: float = derived(
+        lambda c: c.mapping.far_range,
         gt=0,
         description="[m] returns up to here are aligned: the end of a corridor is all"
         " that tells how far along it a robot is",
@@ -37,7 +47,7 @@ class Observation:
     Attributes
     ----------
     scan
-        The scan itself.
+        The scan itself, without readings that the sensor cannot have made.
     found
         Its segments, in beam order.
     oriented
@@ -82,6 +92,14 @@ class Observation:
 def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     """Approximate `scan` with segments, and orient its returns (paper, V, the first step)."""
     p = parameters
+    scan = _without_far(scan, p.max_range)
     found = extract_segments(scan, p.segments)
     oriented, between = scan_points(scan, found, p.sight, p.spacing)
     return Observation(scan, found, oriented, join_points([oriented, between]), p.max_gap)
+
+
+def _without_far(scan: Scan, max_range: float) -> Scan:
+    """Return `scan` with no return for each reading at or beyond `max_range` [m]."""
+    with np.errstate(invalid="ignore"):
+        far = scan.ranges >= max_range
+    return replace(scan, ranges=np.where(far, np.nan, scan.ranges)) if far.any() else scan

@@ -5,23 +5,22 @@ of a scan against what was mapped lately, not what adds up over a path.
 """
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.parameters import StageParameters, derived
 
 EXACT: FloatArray = np.zeros(4)
 """Of a pose that was given and not found, as that of the scan that defines the frame."""
 EXACT.setflags(write=False)
 
 
-class PoseCovarianceParameters(BaseModel):
+class PoseCovarianceParameters(StageParameters):
     """What one point is worth, and what many of them are not."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    noise: float = Field(
-        0.1,
+    noise: float = derived(
+        lambda c: c.sensor.residual_sigma,
         gt=0,
         description="[m] of one point's residual, as in ICP: above the sensor's, because"
         " neighbouring returns err alike",

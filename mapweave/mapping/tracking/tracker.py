@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -27,7 +27,9 @@ from mapweave.mapping.tracking.local_map import LocalMap, LocalMapParameters, Sc
 from mapweave.mapping.tracking.motion_model import MotionModel, MotionModelParameters
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.maps import LineMap
+from mapweave.matching.correlative import CorrelativeParameters
 from mapweave.matching.icp import Target, align, align_all
+from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import points_on_lines
 from mapweave.scan.scan import Scan
 from mapweave.shape.correspondence import CorrespondenceParameters, correspond
@@ -36,18 +38,22 @@ Found = list[tuple[Observation, ScanMatch]]
 EQUAL = 1e-3  # share of the returns by which worth must differ to matter
 
 
-class TrackerParameters(BaseModel):
+class TrackerParameters(StageParameters):
     """What the tracker remembers, expects and accepts."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    local_map: LocalMapParameters = LocalMapParameters()
+    local_map: LocalMapParameters = derived(LocalMapParameters.of)
     correspondence: CorrespondenceParameters = CorrespondenceParameters()
     motion_model: MotionModelParameters = MotionModelParameters()
     acceptance: AcceptanceParameters = AcceptanceParameters()
-    line_spacing: float = Field(0.1, gt=0, description="[m] between points on the map's lines")
+    line_spacing: float = derived(
+        lambda c: c.mapping.resolution, gt=0, description="[m] between points on the map's lines"
+    )
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
-    max_step: float = Field(2.5, gt=0, description="[m] between scans that are tracked")
+    max_step: float = derived(
+        lambda c: 0.5 + c.robot.max_speed * c.sensor.interval,
+        gt=0,
+        description="[m] between scans that are tracked: driven, and 0.5 m for poses that err",
+    )
     promising: float = Field(
         0.6, ge=0, le=1, description="of the best start's support that another must have early"
     )
@@ -59,9 +65,17 @@ class TrackerParameters(BaseModel):
     open_direction: float = Field(
         0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
     )
-    open_reach: float = Field(1.2, gt=0, description="[m] searched along it, each way")
+    open_reach: float = derived(
+        lambda c: CorrelativeParameters.of(c).reach,
+        gt=0,
+        description="[m] searched along it, each way, as in the window of motions",
+    )
     open_step: float = Field(0.2, gt=0, description="[m] between places tried")
-    first_window: float = Field(1.15, gt=0, description="[rad] half the rotation searched first")
+    first_window: float = derived(
+        lambda c: min(np.pi, 1.15 / np.pi * c.robot.max_turn_rate * c.sensor.interval),
+        gt=0,
+        description="[rad] half the rotation searched first",
+    )
     min_points: int = Field(20, ge=3, description="a scan with fewer oriented points is blind")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap, Submap, Trajectory
 from mapweave_protocol.wire import packing
 from mapweave_protocol.wire.model import WireModel
@@ -38,12 +39,12 @@ class PackedLines(WireModel):
         """Return `lines` packed; segments shorter than a millimetre vanish."""
         segments = packing.quantise(lines.segments, packing.PER_METRE, reach)
         kept = cls.kept(lines, reach)
-        lengths = _run_lengths(lines.polyline[kept])
+        counts = _run_lengths(lines.polyline[kept])
         rings = [packing.quantise(ring, packing.PER_METRE, reach) for ring in lines.free_space]
         vertices = np.vstack([np.empty((0, 2), dtype=np.int64), *rings])
         return cls(
             segments=packing.pack_integers(segments[kept].reshape(-1, 2)),
-            polyline_lengths=packing.pack_integers(lengths[:, None]),
+            polyline_lengths=packing.pack_integers(counts[:, None]),
             support=packing.pack_integers(lines.support[kept, None]),
             free_space=packing.pack_integers(vertices),
             free_space_lengths=packing.pack_integers(
@@ -66,14 +67,14 @@ class PackedLines(WireModel):
             If the arrays do not fit each other, or a coordinate is beyond `reach` [m].
         """
         segments = self._segments(reach)
-        lengths = packing.unpack_integers(self.polyline_lengths, 1, MAX_SEGMENTS)[:, 0]
+        counts = packing.unpack_integers(self.polyline_lengths, 1, MAX_SEGMENTS)[:, 0]
         support = packing.unpack_integers(self.support, 1, MAX_SEGMENTS)[:, 0]
-        _check_partition("polylines", lengths, 1, len(segments))
+        _check_partition("polylines", counts, 1, len(segments))
         if len(support) != len(segments):
             raise ValueError(f"support of {len(support)} segments, expected {len(segments)}")
         if np.any((support < 0) | (support > MAX_SUPPORT)):
             raise ValueError(f"support, expected 0 to {MAX_SUPPORT}")
-        polyline = np.repeat(np.arange(len(lengths)), lengths)
+        polyline = np.repeat(np.arange(len(counts)), counts)
         return LineMap(segments, polyline, support, self._free_space(reach))
 
     def _segments(self, reach: float) -> FloatArray:
@@ -81,7 +82,7 @@ class PackedLines(WireModel):
         if len(points) % 2:
             raise ValueError("a segment without an end")
         segments = packing.unquantise(points.reshape(-1, 4), packing.PER_METRE, reach)
-        wall = float(np.hypot(*(segments[:, 2:] - segments[:, :2]).T).sum())
+        wall = float(lengths(segments).sum())
         if wall > MAX_WALL:
             raise ValueError(f"{wall:.0f} m of wall, expected at most {MAX_WALL:.0f} m")
         if np.any(np.all(segments[:, :2] == segments[:, 2:], axis=1)):
@@ -90,10 +91,10 @@ class PackedLines(WireModel):
 
     def _free_space(self, reach: float) -> tuple[FloatArray, ...]:
         vertices = packing.unpack_integers(self.free_space, 2, MAX_VERTICES)
-        lengths = packing.unpack_integers(self.free_space_lengths, 1, MAX_VERTICES)[:, 0]
-        _check_partition("free-space polygons", lengths, 3, len(vertices))
+        counts = packing.unpack_integers(self.free_space_lengths, 1, MAX_VERTICES)[:, 0]
+        _check_partition("free-space polygons", counts, 3, len(vertices))
         metres = packing.unquantise(vertices, packing.PER_METRE, reach)
-        return tuple(np.split(metres, np.cumsum(lengths)[:-1])) if len(lengths) else ()
+        return tuple(np.split(metres, np.cumsum(counts)[:-1])) if len(counts) else ()
 
 
 class PackedTrajectory(WireModel):
@@ -169,6 +170,6 @@ def _run_lengths(labels: IntArray) -> IntArray:
     return np.unique(labels, return_counts=True)[1].astype(np.int64)
 
 
-def _check_partition(what: str, lengths: IntArray, least: int, total: int) -> None:
-    if np.any((lengths < least) | (lengths > total)) or int(lengths.sum()) != total:
+def _check_partition(what: str, counts: IntArray, least: int, total: int) -> None:
+    if np.any((counts < least) | (counts > total)) or int(counts.sum()) != total:
         raise ValueError(f"{what}: expected lengths of at least {least} that add up to {total}")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mapweave.config import Config, Mapping
 from mapweave.io.map_files import read_joint
 from mapweave.maps import parse_component
 from mapweave_fusion_server.store import Store
@@ -40,8 +41,11 @@ def run_team(folder: Path, *arguments: str) -> Run:
 
 @pytest.fixture(scope="module")
 def arena(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Return what two robots in the arena came to."""
-    return run_team(tmp_path_factory.mktemp("arena"), "--world", "arena", "--robots", "2")
+    """Return what two robots in the arena came to, a little more patient than others."""
+    folder = tmp_path_factory.mktemp("arena")
+    config = folder / "patient.toml"
+    config.write_text("[mapping]\npatience = 6\n")
+    return run_team(folder, "--world", "arena", "--robots", "2", "--config", str(config))
 
 
 def test_the_robots_end_in_one_component_rightly(arena: Run) -> None:
@@ -79,6 +83,12 @@ def test_the_joint_map_written_is_the_last_version_of_the_store(arena: Run) -> N
         last = decode(JointMapMessage, messages[-1])
     assert last.version == written["version"] == len(messages)
     assert len(last.components) == len(written["components"])
+
+
+def test_the_joint_map_written_says_what_it_was_made_with(arena: Run) -> None:
+    made_with = read_joint(arena.folder / "joint.json").made_with
+    assert made_with is not None
+    assert made_with.config == Config(mapping=Mapping(patience=6)).values()
 
 
 def test_of_the_versions_those_were_told_that_changed_who_is_together(arena: Run) -> None:

@@ -274,6 +274,27 @@ def test_the_best_leads_by_metres_and_by_its_share(
 
 
 @pytest.mark.parametrize(
+    ("common", "contradicted", "held", "decision", "why"),
+    [
+        (5.0, 0.0, 4.5, "refused", ReasonKind.LITTLE_COMMON),
+        (40.0, 4.0, 9.0, "refused", ReasonKind.CONTRADICTED),
+        (40.0, 0.0, 2.0, "ambiguous", ReasonKind.PARALLEL),
+        (40.0, 1.0, 9.0, "accepted", ReasonKind.CONVINCING),
+    ],
+)
+def test_what_is_wrong_with_the_best_hypothesis_decides(
+    common: float, contradicted: float, held: float, decision: str, why: ReasonKind
+) -> None:
+    """Too little wall, a tenth of it seen through, or held in one direction only."""
+    overlap = common / (common + contradicted)
+    verdict = Verdict(common, contradicted, overlap, 0.02, held, 5.0)
+    best = Hypothesis(np.zeros(3), np.zeros(2), verdict, 0.5)
+    found, reason = decide(best, None, 0.95, DecisionParameters())
+    assert found == decision
+    assert reason.kind is why
+
+
+@pytest.mark.parametrize(
     ("complexity", "held", "decision"),
     [(0.5, 3.0, "accepted"), (0.01, 3.0, "ambiguous"), (0.0, 4.5, "accepted")],
 )

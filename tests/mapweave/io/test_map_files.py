@@ -16,12 +16,13 @@ from hypothesis.extra.numpy import arrays
 from mapweave.errors import FileError
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry.arrays import FloatArray
-from mapweave.io.map_files import load, read_joint, read_map, write_joint, write_map
+from mapweave.io.map_files import load, read_joint, read_map, save, write_joint, write_map
 from mapweave.maps import (
     Alignment,
     JointComponent,
     JointMap,
     LineMap,
+    MadeWith,
     RobotMap,
     Submap,
     Trajectory,
@@ -277,6 +278,45 @@ def test_what_a_later_version_knows_of_an_alignment_is_ignored(
         write_joint(tmp_path / "joint.json", read_joint(write(tmp_path, later)))
         (found,) = json.loads((tmp_path / "joint.json").read_text())["alignments"]
         assert found == TYPED["alignments"][0]
+
+
+CONFIG: dict[str, Any] = {
+    "sensor": {"range_sigma": 0.0123456789, "rate": None},
+    "mapping": {"patience": 5, "later": "a word"},
+}
+MADE_WITH = MadeWith("mapweave 7", CONFIG)
+
+
+def test_what_a_map_was_made_with_comes_back_to_the_last_digit(tmp_path: Path) -> None:
+    path = tmp_path / "map.json"
+    write_map(path, RobotMap("r1", "5f", 1, (), MADE_WITH))
+    assert read_map(path).made_with == MADE_WITH
+    write_map(path, read_map(path))
+    assert read_map(path).made_with == MADE_WITH
+    write_joint(path, JointMap(1, (), (), MADE_WITH))
+    assert read_joint(path).made_with == MADE_WITH
+
+
+@pytest.mark.parametrize("content", [MAP, JOINT])
+def test_a_file_that_does_not_say_what_it_was_made_with_is_read_and_says_nothing_later(
+    content: dict[str, Any], tmp_path: Path
+) -> None:
+    path = tmp_path / "map.json"
+    path.write_text(json.dumps(content))
+    found = load(path)
+    assert found.made_with is None
+    save(found, path)
+    assert "made_with" not in json.loads(path.read_text())
+
+
+@pytest.mark.parametrize("wrong", [3, {"program": "x"}, {"program": 1, "config": {}}])
+def test_what_does_not_tell_what_a_map_was_made_with_is_refused(
+    wrong: object, tmp_path: Path
+) -> None:
+    path = tmp_path / "map.json"
+    path.write_text(json.dumps({**MAP, "made_with": wrong}))
+    with pytest.raises(FileError, match="made_with"):
+        read_map(path)
 
 
 def test_numbers_are_written_no_finer_than_they_mean(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mapweave.errors import FileError
 from mapweave.geometry import se2
 from mapweave.io.readers import count_scans, read_reference_poses, read_scans
 from mapweave.scan.scan import Scan
@@ -252,3 +253,23 @@ def test_the_references_of_a_real_log_agree_with_its_relations(data_dir: Path) -
     errors = np.linalg.norm(moves[:, :2] - known[:, 2:4], axis=1)
     assert len(known) == 136
     assert errors.mean() == pytest.approx(0.051, abs=0.001)  # As the README of the logs states.
+
+
+def test_where_a_log_does_not_state_the_angle_between_beams_it_can_be_given(
+    tmp_path: Path,
+) -> None:
+    for name, text in (("flaser", FLASER), ("stated", ROBOTLASER)):
+        (tmp_path / name).write_bytes(text)
+    (scan,) = read_scans(tmp_path / "flaser", angular_step=0.006, on_warning=fail_on_warning)
+    np.testing.assert_allclose(scan.angles, 0.006 * np.arange(-2, 3))
+    (given,) = read_scans(tmp_path / "stated", angular_step=0.006, on_warning=fail_on_warning)
+    (stated,) = read_scans(tmp_path / "stated", on_warning=fail_on_warning)
+    np.testing.assert_array_equal(given.angles, stated.angles)
+
+
+def test_beams_beyond_a_whole_turn_are_damage_however_the_angle_is_known(tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    path.write_bytes(FLASER)
+    with pytest.raises(FileError, match="within one turn"):
+        count_scans(path, angular_step=2.5)
+    assert count_scans(path, angular_step=0.1) == count_scans(path) == 1

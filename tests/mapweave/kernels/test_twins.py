@@ -7,25 +7,34 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mapweave.geometry.arrays import FloatArray
 from mapweave.kernels import correlative, segmentation
 from mapweave.kernels.loading import COMPILED
-from mapweave.kernels.point_map import IcpSettings, NumpyPointMap
+from mapweave.kernels.point_map import (
+    IcpSettings,
+    NumpyPointMap,
+    PointMap,
+    icp_settings,
+    make_point_map,
+)
 from mapweave.kernels.segmentation import SegmentationSettings
 from mapweave.kernels.viewpoints import NumpyViewpoints
 
 pytestmark = pytest.mark.skipif(COMPILED is None, reason="no compiled kernels here")
-SETTINGS = (0.35, 0.04, 0.75, 2e-4, 0.1, 25, 4, 0.7)
+SETTINGS = IcpSettings(0.35, 0.04, 0.75, 2e-4, 0.1, 25, 4, 0.7)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def oriented(rng: np.random.Generator, count: int, spread: float = 4.0) -> tuple[np.ndarray, ...]:
+def oriented(
+    rng: np.random.Generator, count: int, spread: float = 4.0
+) -> tuple[FloatArray, FloatArray]:
     angle = rng.uniform(-np.pi, np.pi, count)
     return rng.uniform(-spread, spread, (count, 2)), np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def both(thin: float = 0.0, blocks: int = 5) -> tuple[object, NumpyPointMap]:
-    assert COMPILED is not None
-    return COMPILED.PointMap(0.4, 0.25, thin, blocks), NumpyPointMap(0.4, 0.25, thin, blocks)
+def both(thin: float = 0.0, blocks: int = 5) -> tuple[PointMap, PointMap]:
+    twin = NumpyPointMap(0.4, 0.25, thin, blocks)
+    return make_point_map(0.4, 0.25, thin, blocks), twin
 
 
 @settings(max_examples=40, deadline=None)
@@ -44,17 +53,21 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
     for one, other in zip(compiled.content(), twin.content(), strict=True):
         np.testing.assert_array_equal(one, other)
     asked = oriented(rng, 30)
-    for one, other in zip(compiled.find(*asked, 1.0), twin.find(*asked, 1.0), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12)
+    reach = float(rng.choice([0.3, 1.0, np.inf]))
+    distance, number = compiled.find(*asked, reach)
+    twin_distance, twin_number = twin.find(*asked, reach)
+    np.testing.assert_allclose(distance, twin_distance, rtol=1e-12)
+    np.testing.assert_array_equal(number, twin_number)
     poses = rng.uniform(-3, 3, (3, 3))
     np.testing.assert_array_equal(
         compiled.explains(*asked, poses, 0.5), twin.explains(*asked, poses, 0.5)
     )
-    beams = rng.uniform(0, 9, 50), -1.5, 0.06
-    sight = (0.3, 3.0, 6.0, 0.7, int(rng.integers(1, 4)))
-    np.testing.assert_allclose(
-        compiled.seen_through(*beams, poses, *sight), twin.seen_through(*beams, poses, *sight)
-    )
+    clear, every = rng.uniform(0, 9, 50), int(rng.integers(1, 4))
+
+    def shares(points: PointMap) -> FloatArray:
+        return points.seen_through(clear, -1.5, 0.06, poses, 0.3, 3.0, 6.0, 0.7, every)
+
+    np.testing.assert_allclose(shares(compiled), shares(twin))
 
 
 @settings(max_examples=25, deadline=None)
@@ -69,8 +82,8 @@ def test_alignments_end_at_the_same_poses(seed: int, tagged: bool) -> None:
     starts = rng.normal(0, 1, (4, 3)) * [[0.05], [0.05], [0.4], [0.4]]
     prior = np.diag([4.0, 4.0, 8.0])
     more = (tags, rng.random((3, 3)) < 0.7) if tagged else (None, None)
-    one = compiled.align(points, normals, starts, prior, COMPILED.IcpSettings(*SETTINGS), *more)
-    other = twin.align(points, normals, starts, prior, IcpSettings(*SETTINGS), *more)
+    one = compiled.align(points, normals, starts, prior, icp_settings(SETTINGS), *more)
+    other = twin.align(points, normals, starts, prior, SETTINGS, *more)
     np.testing.assert_array_equal(one[0], other[0])
     np.testing.assert_allclose(one[1], other[1], atol=1e-9)
     np.testing.assert_allclose(one[2], other[2], atol=1e-6, rtol=1e-9)
@@ -117,7 +130,7 @@ def test_windows_score_the_same(seed: int, count: int) -> None:
         lambda m: m.explains(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((1, 2)), 1.0),
     ],
 )
-def test_lengths_that_do_not_agree_are_refused(refused: Callable[[object], None]) -> None:
+def test_lengths_that_do_not_agree_are_refused(refused: Callable[[PointMap], object]) -> None:
     for each in both():
         with pytest.raises(ValueError, match="expected"):
             refused(each)

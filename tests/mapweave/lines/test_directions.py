@@ -2,7 +2,12 @@
 
 import numpy as np
 import pytest
+import scipy.signal
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
+from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.lines.directions import (
@@ -11,8 +16,10 @@ from mapweave.lines.directions import (
     direction_histogram,
     likely_turns,
     line_difference,
+    local_maxima,
     main_directions,
     nearest_direction,
+    prominences,
 )
 from tests.mapweave.buildings import BUILDING, part
 
@@ -74,6 +81,13 @@ def test_round_walls_have_no_main_direction() -> None:
     assert len(main_directions(walls(np.arange(0.0, 360.0, 3.0)))) == 0
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_chance_makes_no_main_direction(seed: int) -> None:
+    """300 walls in any direction: the histogram has many peaks, none of them significant."""
+    anywhere = np.random.default_rng(seed).uniform(0, 360, 300)
+    assert len(main_directions(walls(anywhere))) == 0
+
+
 def test_nothing_has_no_main_direction() -> None:
     assert len(main_directions(np.empty((0, 4)))) == 0
 
@@ -114,6 +128,13 @@ def test_drift_makes_no_direction_of_its_own() -> None:
     assert len(main_directions(drifting)) == 2
 
 
+@pytest.mark.parametrize(("beside", "count"), [(5.0, 1), (20.0, 2)])
+def test_a_shoulder_of_a_main_direction_is_none_of_its_own(beside: float, count: int) -> None:
+    """Half the wall, 5° beside: no valley parts the two; 20° beside one does."""
+    turned = np.concatenate([walls(np.array([0.0]), 10.0), walls(np.array([beside]), 5.0)])
+    assert len(main_directions(turned)) == count
+
+
 def test_the_nearest_direction_is_that_of_a_line() -> None:
     directions = np.deg2rad([2.0, 92.0])
     found = nearest_direction(np.deg2rad([181.0, -90.0, 45.0]), directions, np.deg2rad(5.0))
@@ -142,3 +163,29 @@ def test_visible_sides_tell_half_a_turn_from_none() -> None:
     walls = np.array([[0.0, 0, 6, 0], [6, 0, 6, 4], [0, 4, 0, 0]])
     assert abs(likely_turns(walls, walls, 4, 0.17)[0]) < np.radians(1)
     assert abs(se2.wrap(likely_turns(walls, walls[:, [2, 3, 0, 1]], 4, 0.17)[0] - np.pi)) < 0.02
+
+
+@given(
+    st.lists(st.one_of(st.integers(0, 4), st.floats(0, 9)), min_size=3, max_size=60).map(
+        lambda values: np.array(values, dtype=float)
+    )
+)
+def test_peaks_and_their_prominences_are_scipys(values: FloatArray) -> None:
+    peaks, found = scipy.signal.find_peaks(values, prominence=0.0)
+    np.testing.assert_array_equal(local_maxima(values), peaks)
+    np.testing.assert_array_equal(prominences(values, local_maxima(values)), found["prominences"])
+
+
+@pytest.mark.parametrize(
+    ("segments", "weights", "complaint"),
+    [
+        ([[0.0, 0, 1, np.nan]], None, "^segments: expected finite"),
+        ([0.0, 0, 1, 1], None, r"^segments: expected \(n, 4\)"),
+        ([[0, 0], [1, 0], [1, 1]], [1.0], r"^weights: expected \(2,\)"),
+    ],
+)
+def test_what_is_no_wall_is_refused_by_name(
+    segments: ArrayLike, weights: ArrayLike, complaint: str
+) -> None:
+    with pytest.raises(ArgumentError, match=complaint):
+        main_directions(segments, weights)

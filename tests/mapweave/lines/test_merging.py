@@ -10,7 +10,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.io.readers import read_reference_poses, read_scans
 from mapweave.lines.merging import Evolution, MergingParameters, count_support, evolve, merge_scan
-from mapweave.lines.merging_cost import Pairs
+from mapweave.lines.merging_cost import Pairs, merge_cost
 from mapweave.lines.merging_rules import Pairing
 from mapweave.lines.slivers import absorb_slivers
 from mapweave.scan.segmentation import extract_segments
@@ -128,6 +128,32 @@ def test_two_sightings_5_cm_apart_are_one_wall() -> None:
     assert merges([0, 0, 3, 0], [0.5, 0.05, 3.4, 0.05])
 
 
+def test_sightings_of_a_long_wall_fan_out_as_poses_turn() -> None:
+    """15 cm apart: of 8 m that is a scan turned by a degree, of 1 m it is another surface."""
+    assert merges([0, 0, 8, 0], [0, 0.15, 8, 0.15])
+    assert not merges([0, 0, 1, 0], [0, 0.15, 1, 0.15])
+
+
+@pytest.mark.parametrize(("apart", "cost", "one"), [(0.20, 0.15, True), (0.29, 0.2175, False)])
+def test_merging_stops_at_a_cost_of_20_cm(apart: float, cost: float, one: bool) -> None:
+    """Of two equal parallel walls of 11 m, none of which any other rule keeps apart."""
+    first, second = [0.0, 0, 11, 0], [0.0, apart, 11, apart]
+    assert merge_cost(np.array([first]), np.array([second]))[0] == pytest.approx(cost)
+    assert merges(first, second) == one
+
+
+def test_what_a_pair_costs_is_reckoned_in_the_main_direction_that_it_would_follow() -> None:
+    """Two pieces of one straight line, 3° off the walls: each is turned, at 2 l tan 3° (VII)."""
+    walls = np.array([[0, y, 20, y] for y in (5, 6, 7)], dtype=float)
+    ahead = np.array([np.cos(np.deg2rad(3)), np.sin(np.deg2rad(3))])
+    line = np.array([np.concatenate([k * ahead, (k + 1) * ahead]) for k in (0, 1)])
+    turned = 2 * np.tan(np.deg2rad(3))  # 0.105 m
+    for limit, pieces in ((0.9 * turned, 2), (1.1 * turned, 1)):
+        parameters = MergingParameters(max_cost=limit)
+        found = evolve(np.concatenate([walls, line]), None, parameters)
+        assert len(found.segments) == len(walls) + pieces
+
+
 def test_opposite_faces_are_never_one_wall() -> None:
     assert not merges([0, 0, 3, 0], [3, 0, 0, 0])
     assert not merges([0, 0, 3, 0], [3, -0.1, 0, -0.1])
@@ -211,6 +237,23 @@ def test_a_scan_is_paired_with_the_map_and_labels_follow_both() -> None:
     assert of_scan[1] not in (first, second)
     assert evolution.weights[first] == pytest.approx(42)
     np.testing.assert_allclose(evolution.segments[of_scan[1]], scan[1])
+
+
+def test_what_a_scan_saw_of_a_known_wall_goes_to_it_and_not_to_its_neighbour_in_the_scan() -> None:
+    """A scan turned by a degree saw 12 m in two pieces; as one they would be off the 4 m known."""
+    known = np.array([[0.0, 0, 4, 0]])
+    scan = np.array([[0, 0.02, 4, 0.10], [4, 0.10, 12, 0.26]])
+    wall, near, far = merge_scan(known, np.array([400.0]), scan).labels
+    assert near == wall
+    assert far != wall
+
+
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_of_two_known_walls_the_nearer_one_gets_what_a_scan_saw(order: list[int]) -> None:
+    known = np.array([[0.0, 0, 1, 0], [0.0, 0.16, 1, 0.16]])[order]
+    scan = np.array([[0.0, 0.1, 1, 0.1]])
+    *walls, seen = merge_scan(known, np.array([40.0, 40.0]), scan).labels.tolist()
+    assert seen == walls[order.index(1)]
 
 
 def test_a_scan_joins_two_parts_of_a_wall() -> None:

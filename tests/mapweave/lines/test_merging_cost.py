@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
+from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import ComplexArray, FloatArray
 from mapweave.lines.merging_cost import (
@@ -216,3 +218,31 @@ def test_ends_within_the_noise_are_averaged_and_others_are_not() -> None:
 def test_a_segment_of_no_length_is_merged_with_nothing() -> None:
     cost = merge_cost(np.array([[1.0, 1, 1, 1]]), np.array([[0.0, 1, 2, 1], [1, 1, 1, 1]]))
     assert np.isposinf(cost).all()
+
+
+def test_one_pair_is_given_as_lists_and_compared_with_itself_costs_nothing() -> None:
+    np.testing.assert_allclose(merge_cost([0, 0, 3, 1], [0, 0, 3, 1]), [0.0], atol=1e-12)
+    np.testing.assert_allclose(merged_segment([0, 0, 3, 1], [0, 0, 3, 1]), [[0, 0, 3, 1]])
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("first", [[0.0, 0, 1]]),
+        ("first", [[0.0, 0, 1, np.nan]]),
+        ("second", [[0, 0, 1, 0]] * 3),
+        ("second", "wall"),
+        ("direction", [0.1, 0.2, 0.3]),
+        ("direction", np.nan),
+        ("first_weight", [1.0]),
+        ("second_weight", np.inf),
+    ],
+)
+def test_what_is_no_pair_is_refused_by_the_name_of_the_argument(
+    argument: str, value: ArrayLike
+) -> None:
+    walls = [[0, 0, 3, 0], [0, 1, 3, 1]]
+    given: dict[str, ArrayLike] = {"first": walls, "second": walls, argument: value}
+    for function in (merge_cost, merged_segment):
+        with pytest.raises(ArgumentError, match=rf"^{argument}: expected"):
+            function(**given)

@@ -4,10 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
+from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.lines.polylines import group_polylines
+from mapweave.lines.polylines import generalized_polylines, group_polylines
 
 MAX_GAP = 0.6
 
@@ -151,3 +153,22 @@ def test_a_segment_does_not_follow_itself() -> None:
     """One shorter than max_gap ends near its own start."""
     short = np.array([[0.0, 0, 0.1, 0], [0.5, 0, 0.6, 0]])
     assert as_polylines(*group_polylines(short, MAX_GAP)) == [(0, 1)]
+
+
+def test_the_polylines_of_a_list_are_those_of_its_order() -> None:
+    walls = [[9.0, 9, 9, 8], [0.0, 0, 2, 0], [2.0, 0.1, 2, 3]]
+    found = generalized_polylines(walls)
+    assert [polyline.tolist() for polyline in found] == [[walls[0]], walls[1:]]
+    assert [len(polyline) for polyline in generalized_polylines(walls, 0.05)] == [1, 1, 1]
+    assert generalized_polylines([]) == []
+
+
+@pytest.mark.parametrize(
+    ("segments", "max_gap", "argument"),
+    [([[0, 0, 1]], 0.5, "segments"), ([[0, 0, 1, np.inf]], 0.5, "segments"), ([], 0.0, "max_gap")],
+)
+def test_what_cannot_be_grouped_is_refused_by_name(
+    segments: ArrayLike, max_gap: float, argument: str
+) -> None:
+    with pytest.raises(ArgumentError, match=rf"^{argument}: expected"):
+        generalized_polylines(segments, max_gap)

@@ -6,7 +6,8 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.lines.sightings import Nearness, Sightings, sample, units
+from mapweave.geometry.segments import sample, units
+from mapweave.lines.sightings import Nearness, Sightings
 from tests.mapweave.buildings import random_pose
 
 

@@ -7,9 +7,10 @@ from shapely.geometry import Polygon
 from benchmarks.compactness import compactness
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.segments import units
+from mapweave.lines.fitting import FittingParameters
 from mapweave.lines.merging import evolve
-from mapweave.lines.sightings import units
-from mapweave.lines.simplification import simplify, sources
+from mapweave.lines.simplification import SimplificationParameters, simplify, sources
 from tests.mapweave.buildings import BUILDING, random_pose, rectangle, walls_of
 
 WALLS = walls_of(BUILDING)
@@ -88,3 +89,10 @@ def test_sources_are_the_sightings_along_a_segment_and_not_those_across_or_behin
 def test_nothing_seen_makes_no_wall() -> None:
     nothing = np.empty((0, 4))
     assert simplify(nothing, nothing, np.empty(0, dtype=np.int64), Polygon()).shape == (0, 4)
+
+
+def test_sources_lie_as_near_as_what_a_segment_was_placed_by() -> None:
+    wall, seen = np.array([[0.0, 0, 4, 0]]), np.array([[0.0, 0.08, 4, 0.08]])
+    for tolerance, count in ((0.07, 0), (0.09, 1)):
+        p = SimplificationParameters(placement=FittingParameters(tolerance=tolerance))
+        assert [len(found) for found in sources(wall, seen, p)] == [count, count]

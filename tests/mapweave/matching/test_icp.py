@@ -79,6 +79,26 @@ def test_the_prior_decides_the_direction_that_walls_leave_open() -> None:
     assert firm[0] == pytest.approx(0.0, abs=0.01)
 
 
+def test_a_prior_as_strong_as_the_walls_holds_a_pose_half_way() -> None:
+    """The walls pull across by 0.1 m, every point at full weight."""
+    parameters = IcpParameters(start_scale=1e6, end_scale=1e6)
+    walls = surface_of(np.array([[0.0, 0, 20, 0], [20, 2, 0, 2]]))
+    moving = walls.moved(np.array([0.0, -0.1, 0.0]))
+    strength = len(walls) / parameters.noise**2
+    prior = np.diag([strength, strength, 1e9])
+    fit = align(moving, Target.of(walls, parameters), np.zeros(3), parameters, prior)
+    assert fit.pose[1] == pytest.approx(0.05, abs=1e-3)
+
+
+def test_what_was_moved_in_a_room_hardly_pulls(rng: Generator) -> None:
+    """A fifth of the points lie 0.1 m before their wall: they count for little, not for a fifth."""
+    room = surface_of(walls_of(rectangle(0, 0, 6, 4)))
+    moved = rng.random(len(room)) < 0.2
+    points = room.points + np.where(moved[:, None], 0.1 * np.array([1.0, 1.0]), 0.0)
+    seen = OrientedPoints(points, room.normals, room.polyline)
+    assert_same_pose(align(seen, Target.of(room, P), se2.IDENTITY, P).pose, np.zeros(3), 0.003, 0.1)
+
+
 def test_the_other_side_of_a_wall_does_not_pull() -> None:
     """A wall 0.2 m thick, seen from one side: its far side is nearer, and faces away."""
     near_side = surface_of(np.array([[0.0, 0, 6, 0], [6, 0, 6, 3]]))

@@ -94,6 +94,10 @@ def test_rings_have_no_holes_and_cover_the_same_area() -> None:
     assert shapely.symmetric_difference(from_rings(outlines), square).area < 1e-9
 
 
+def test_what_is_not_free_anywhere_has_no_rings() -> None:
+    assert rings(Polygon()) == rings(from_rings([])) == ()
+
+
 def test_overlapping_rings_are_united_and_slivers_ignored() -> None:
     overlapping = (rectangle(0, 0, 4, 4), rectangle(2, 0, 6, 4), np.array([[0.0, 0.0], [1, 1]]))
     assert from_rings(overlapping).area == pytest.approx(24)
@@ -104,3 +108,13 @@ def test_overlapping_rings_are_united_and_slivers_ignored() -> None:
 def test_crumbs_are_left_out_of_the_union(crumb: FloatArray) -> None:
     united = unite([Polygon(rectangle(0, 0, 4, 4)), Polygon(crumb)], P)
     assert united.area == pytest.approx(16)
+
+
+def test_a_doubled_end_beam_of_a_full_turn_changes_no_free_space() -> None:
+    """The fan of a full turn closes on itself."""
+    angles = np.linspace(-np.pi, np.pi, 361)
+    ranges = 3 + np.cos(angles)
+    doubled = scan_free_space(Scan(ranges, angles), np.zeros(3), P)
+    single = scan_free_space(Scan(ranges[:-1], angles[:-1]), np.zeros(3), P)
+    assert doubled.area == pytest.approx(single.area, rel=0.01)
+    assert doubled.area == pytest.approx(np.pi * (2.85**2 + 0.5), rel=0.02)

@@ -1,16 +1,140 @@
-"""A scan's points are where its beams ended, in the sensor's frame."""
+"""A scan is checked when it is made, whichever way its sensor turns."""
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
-from mapweave.scan.scan import Scan
+from mapweave.errors import ArgumentError
+from mapweave.geometry.arrays import FloatArray
+from mapweave.scan import Scan, extract_segments
+from mapweave.scan.scan import UNNUMBERED
+from tests.mapweave.buildings import AROUND, BUILDING, cast, walls_of
+
+HERE = np.array([3.0, 1.0, 0.2])
+FULL = np.linspace(-np.pi, np.pi, 360, endpoint=False)
 
 
-def test_ahead_is_x_and_left_is_y() -> None:
+def test_points_lie_along_their_beams() -> None:
     scan = Scan(np.array([1.0, 2.0, 3.0]), np.array([-np.pi / 2, 0.0, np.pi / 2]))
     np.testing.assert_allclose(scan.points, [[0, -1], [2, 0], [0, 3]], atol=1e-12)
 
 
-def test_a_beam_that_did_not_come_back_has_no_point() -> None:
-    scan = Scan(np.array([np.nan, 2.0]), np.array([0.0, 0.1]))
+def test_a_scan_is_made_of_lists_and_needs_no_more() -> None:
+    scan = Scan([1, 2, 3], [-0.5, 0, 0.5])
+    assert scan.ranges.dtype == scan.angles.dtype == np.float64
+    assert (scan.index, scan.odometry) == (UNNUMBERED, None)
+    assert math.isnan(scan.stamp)
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf, 0.0, -1.0])
+def test_what_is_no_distance_is_no_return(nothing: float) -> None:
+    scan = Scan([nothing, 2.0], [0.0, 0.1])
     assert scan.hits.tolist() == [False, True]
-    assert np.isnan(scan.points[0]).all() and np.isfinite(scan.points[1]).all()
+    assert np.isnan(scan.ranges[0])
+    assert np.isnan(scan.points).tolist() == [[True, True], [False, False]]
+
+
+def test_a_clockwise_sensor_shows_the_same_scan() -> None:
+    scan = cast(walls_of(BUILDING), HERE)
+    clockwise = Scan(scan.ranges[::-1], scan.angles[::-1])
+    np.testing.assert_array_equal(clockwise.angles, scan.angles)
+    np.testing.assert_array_equal(clockwise.ranges, scan.ranges)
+
+
+@given(st.floats(-math.pi, 0.0), st.floats(0.001, 0.01), st.integers(2, 500))
+def test_what_drivers_state_is_the_scan_whichever_way_it_is_stated(
+    start: float, step: float, count: int
+) -> None:
+    ranges = np.linspace(1.0, 2.0, count)
+    one = Scan.of(ranges, start, step)
+    other = Scan.of(ranges[::-1], start + step * (count - 1), -step)
+    np.testing.assert_allclose(other.angles, one.angles, atol=1e-12)
+    np.testing.assert_array_equal(other.ranges, one.ranges)
+
+
+def test_readings_out_of_the_drivers_range_are_no_returns() -> None:
+    scan = Scan.of([0.01, 1.0, 30.0, 31.0], 0.0, 0.1, range_min=0.02, range_max=30.0, stamp=7.0)
+    assert scan.hits.tolist() == [False, True, True, False]
+    assert scan.stamp == 7.0
+
+
+def test_a_scan_cannot_be_changed_and_changes_with_nothing() -> None:
+    ranges, angles = np.array([1.0, 2.0]), np.array([0.0, 0.1])
+    scan = Scan(ranges, angles)
+    ranges[0] = angles[0] = -9.0
+    assert (scan.ranges[0], scan.angles[0]) == (1.0, 0.0)
+    with pytest.raises(ValueError, match="read-only"):
+        scan.ranges[0] = 5.0
+
+
+@pytest.mark.parametrize(
+    "angles",
+    [FULL, FULL + np.pi, np.linspace(-np.pi, np.pi, 361), np.linspace(0, 2 * np.pi, 361)],
+)
+def test_a_full_turn_is_a_scan_wherever_it_begins_and_with_a_doubled_beam(
+    angles: FloatArray,
+) -> None:
+    """All show the room that a scan all around shows."""
+    scan = cast(walls_of(BUILDING), HERE, angles=angles)
+    assert len(scan.angles) == len(angles)
+    around = cast(walls_of(BUILDING), HERE, angles=AROUND)
+    seen, expected = (total_length(extract_segments(s).segments) for s in (scan, around))
+    assert seen == pytest.approx(expected, rel=0.05)
+
+
+def total_length(segments: FloatArray) -> float:
+    return float(np.hypot(*(segments[:, 2:] - segments[:, :2]).T).sum())
+
+
+def test_a_turn_whose_increment_was_rounded_is_a_turn() -> None:
+    assert len(Scan.of(np.ones(361), -np.pi, 0.0175).angles) == 361  # 6.3 rad
+
+
+@pytest.mark.parametrize(
+    ("ranges", "angles", "complaint"),
+    [
+        ([1, 2, 3], [0, 0.1], r"^angles: expected \(3,\), one a range, got shape \(2,\)"),
+        ([[1, 2]], [[0, 0.1]], r"^ranges: expected \(n,\) distances \[m\], got shape \(1, 2\)"),
+        ([1, 2], [0, math.nan], r"^angles: .* got nan for beam 1"),
+        ([1, 2], [math.nan, math.nan], r"^angles: .* got nan for beam 0"),
+        ([1, 2], [-math.inf, 0], r"^angles: .* got -inf for beam 0"),
+        ([1], [math.nan], r"^angles: expected finite"),
+        ([1, 2, 3], [0, 0.2, 0.1], r"^angles: .* ascend"),
+        ([1, 2, 3], [0, 0, 0.1], r"^angles: .* ascend"),
+        ([1, 2, 3], [0.2, 0.3, 0.1], r"^angles: .* ascend"),
+        (np.ones(400), np.radians(np.arange(400)), r"^angles: expected one turn at the most"),
+        ("far", [0.0], r"^ranges: expected \(n,\) distances \[m\], got str"),
+        ([1, 2], ["left", "right"], r"^angles: expected \(n,\) directions \[rad\], got list"),
+    ],
+)
+def test_what_is_no_scan_is_refused_by_the_name_of_the_argument(
+    ranges: ArrayLike, angles: ArrayLike, complaint: str
+) -> None:
+    with pytest.raises(ArgumentError, match=complaint):
+        Scan(ranges, angles)
+
+
+@pytest.mark.parametrize("odometry", [[1, 2], [1, 2, math.nan], "home"])
+def test_odometry_is_a_pose(odometry: ArrayLike) -> None:
+    with pytest.raises(ArgumentError, match=r"^odometry: expected \(3,\)"):
+        Scan.of([1, 2], 0.0, 0.1, odometry=odometry)
+    assert Scan.of([1, 2], 0.0, 0.1, odometry=[1, 2, 3]).odometry is not None
+
+
+@pytest.mark.parametrize(
+    ("start", "increment", "name"),
+    [(math.nan, 0.1, "angle_min"), (0, math.nan, "angle_increment"), (0, 0, "angle_increment")],
+)
+def test_an_increment_turns_the_beam(start: float, increment: float, name: str) -> None:
+    with pytest.raises(ArgumentError, match=rf"^{name}: expected"):
+        Scan.of([1, 2], start, increment)
+
+
+def test_no_beams_are_a_blind_scan() -> None:
+    nothing: Sequence[float] = []
+    assert Scan.of(nothing, 0.0, 0.1).points.shape == (0, 2)

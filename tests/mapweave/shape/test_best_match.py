@@ -4,8 +4,9 @@ from math import pi
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
-from mapweave.errors import MapweaveError
+from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.shape.partial_match import best_match
@@ -143,10 +144,23 @@ def test_a_stretch_leaves_gaps_and_segments_without_length_out() -> None:
 
 
 def test_a_part_longer_than_the_polyline_is_refused_with_both_lengths() -> None:
-    with pytest.raises(MapweaveError, match=r"part: expected at most .* 2 m, got 6 m"):
+    with pytest.raises(ArgumentError, match=r"^part: expected at most .* 2 m, got 6 m"):
         best_match(ELBOW, CORNER)
 
 
 def test_a_part_without_length_has_no_shape() -> None:
     with pytest.raises(NoShapeError):
         best_match(np.array([[1.0, 1, 1, 1]]), CORNER)
+
+
+def test_of_equal_stretches_the_first_is_taken_and_vertices_are_polylines() -> None:
+    stairs = [[0, 0], [1, 0], [1, 1], [2, 1], [2, 2], [3, 2], [3, 3]]
+    assert best_match(stairs[:3], stairs).start == pytest.approx(0)
+
+
+@pytest.mark.parametrize("wrong", [[[0, 0, 1]], [[0, 0, 1, np.nan]], [0, 0, 1, 1], "wall"])
+def test_what_is_no_polyline_is_refused_by_the_name_of_the_argument(wrong: ArrayLike) -> None:
+    with pytest.raises(ArgumentError, match=r"^part: expected"):
+        best_match(wrong, ELBOW)
+    with pytest.raises(ArgumentError, match=r"^polyline: expected"):
+        best_match(CORNER, wrong)

@@ -4,7 +4,9 @@ from math import pi
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
+from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.shape.tangent_space import (
@@ -178,3 +180,23 @@ def test_a_polyline_without_length_among_others_is_not_complex() -> None:
     expected = [complexity(corner[:2]), 0]
     np.testing.assert_allclose(complexities(corner, np.array([0, 0, 4])), expected)
     assert complexities(np.empty((0, 4)), np.empty(0, dtype=np.int64)).shape == (0,)
+
+
+def test_a_polyline_is_given_as_vertices_or_as_segments() -> None:
+    vertices = [(0, 0), (2, 0), (2, 1), (5, 1)]
+    segments = [(0, 0, 2, 0), (2, 0, 2, 1), (2, 1, 5, 1)]
+    assert complexity(vertices) == complexity(segments) > 0
+    assert similarity(vertices, segments) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "wrong", [np.zeros((2, 3)), [0, 0, 1, 1], [[0, 0, 1, np.nan]], [[0, 0]], "wall"]
+)
+def test_what_is_no_polyline_is_refused_by_the_name_of_the_argument(wrong: ArrayLike) -> None:
+    corner = [[0, 0], [1, 0], [1, 1]]
+    with pytest.raises(ArgumentError, match=r"^polyline: expected"):
+        complexity(wrong)
+    with pytest.raises(ArgumentError, match=r"^c: expected"):
+        similarity(wrong, corner)
+    with pytest.raises(ArgumentError, match=r"^d: expected"):
+        similarity(corner, wrong)

@@ -185,6 +185,19 @@ def test_only_salient_similar_close_pairs_become_candidates_best_first() -> None
     assert (np.diff(found.score) <= 0).all()
 
 
+def test_each_limit_leaves_out_what_is_beyond_it_and_nothing_else() -> None:
+    """Of all pairs that no neighbour beats, those within the limit, one limit at a time."""
+    a, b = (windows(*random_map(seed), 1.5, 12, 0.15) for seed in (7, 8))
+    every = match(a, b, EVERYTHING)
+    close = match(a, b, EVERYTHING.model_copy(update={"max_residual": 0.3}))
+    assert 0 < (every.residual <= 0.3).sum() == len(close) < len(every)
+    assert (close.residual <= 0.3).all()
+    salient = match(a, b, EVERYTHING.model_copy(update={"min_complexity": 0.2}))
+    assert 0 < len(salient) < len(every)
+    assert (a.complexity[salient.window_a] >= 0.2).all()
+    assert (b.complexity[salient.window_b] >= 0.2).all()
+
+
 def test_the_most_salient_windows_are_compared_when_there_are_too_many() -> None:
     segments, polyline = random_map(9)
     cut = windows(segments, polyline, 2.0, 16, 0.2)
@@ -211,6 +224,18 @@ def test_different_gaps_show_in_the_residual_alone() -> None:
     assert found.similarity[0] == pytest.approx(1)
     centred = found.residual[(found.window_a == 12) & (found.window_b == 12)]
     assert centred == pytest.approx(0.4)
+
+
+def test_of_windows_that_turn_alike_the_one_whose_points_lie_apart_explains_less() -> None:
+    """The same corner twice, once with a gap of 0.8 m: 0.4 m rms of the 3 m that outweigh all."""
+    segments, one = corner_map()
+    gaping = segments + np.array([[50.0, 0, 50, 0], [50.0, 0.8, 50, 0.8]])
+    both, two = np.vstack([gaping, segments]), np.array([0, 0, 1, 1])
+    ours, theirs = windows(segments, one, 2.0, 20, 0.25), windows(both, two, 2.0, 20, 0.25)
+    found = match(ours, theirs, WindowParameters())
+    centred = found.take((found.window_a == 12) & (found.similarity > 1 - 1e-9))
+    assert theirs.polyline[centred.window_b].tolist() == [1, 0]  # the best first
+    assert centred.score[0] - centred.score[1] == pytest.approx(2.0 * 0.4 / 3.0)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

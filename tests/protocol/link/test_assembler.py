@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapweave.maps import RobotMap, Submap
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler, MapSender
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.messages import MapMessage
@@ -150,6 +150,22 @@ def test_a_cache_of_that_many_messages_always_holds_a_complete_one(random_map: M
     complete = [message.complete for message in sent_by(changing)]
     for start in range(len(complete) - MESSAGES_TO_COMPLETE):
         assert any(complete[start : start + MESSAGES_TO_COMPLETE])
+
+
+def test_a_large_map_is_repeated_after_so_many_messages_however_little_changes() -> None:
+    """Each message is a few hundred bytes, the whole is half a megabyte: bytes are no reason."""
+    rng = np.random.default_rng(1)
+    starts = rng.uniform(-900, 900, (30_000, 2))
+    segments = np.hstack([starts, starts + rng.uniform(0.5, 1.0, starts.shape)])
+    lines = LineMap(segments, np.arange(len(segments)), np.ones(len(segments), dtype=np.int64))
+    submap = Submap(0, 0, np.zeros(3), lines, Trajectory.empty())
+    sender = MapSender()
+    sizes = [
+        len(sender.payload(RobotMap("a", "b1", k, (replace(submap, pose=np.full(3, 1e-3 * k)),))))
+        for k in range(1, MESSAGES_TO_COMPLETE + 2)
+    ]
+    whole = [k for k, size in enumerate(sizes) if size > 1e5]
+    assert whole == [0, MESSAGES_TO_COMPLETE]
 
 
 def test_another_run_of_a_robot_starts_from_nothing_and_the_old_one_stays_past(

@@ -50,9 +50,17 @@ def test_a_name_that_is_no_id_makes_no_key(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "key", ["", "mapweave/@v1/t/agent/r/map/", "mapweave/@v2/t/agent/r/map", "x/mapweave"]
+    "key",
+    [
+        "",
+        "mapweave/@v1/t/agent/r/map/",
+        "mapweave/@v1/t/agent/r/more/map",
+        "mapweave/@v2/t/agent/r/map",
+        "x/mapweave",
+    ],
 )
 def test_a_foreign_key_is_refused(key: str) -> None:
+    assert not keys.MAP.matches(key)
     with pytest.raises(ForeignKeyError):
         keys.MAP.parse(key)
 

@@ -11,13 +11,18 @@ from mapweave.mapping.tracking.local_map import ScanEvidence
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
 from mapweave.mapping.tracking.tracker import Tracker
 from mapweave.maps import LineMap
+from mapweave.scan.points import OrientedPoints, points_on_lines
 from mapweave.scan.scan import Scan
+from mapweave.scan.segmentation import ScanSegments
+from mapweave.shape.correspondence import Correspondence
 from tests.mapweave.buildings import (
+    AROUND,
     BUILDING,
     FRONT,
     OTHER_BUILDING,
     cast,
     corridor,
+    line_map,
     scans_along,
     walls_of,
 )
@@ -75,6 +80,66 @@ def test_a_sudden_turn_on_the_spot_is_followed(rng: Generator) -> None:
     assert np.degrees(np.abs(off[:, 2])).max() < 1
 
 
+@pytest.mark.parametrize(
+    ("start", "leap"),
+    [
+        ([13, 1, 0], [0.2, -2.4, -2.5]),
+        ([13, 1, 0], [-2.4, 0.0, 3.1]),
+        ([13, 1, 0], [2.4, 0.0, -1.6]),
+        ([24, 1, 0], [0.0, -2.4, -1.6]),
+    ],
+)
+def test_a_leap_farther_than_the_search_reaches_is_found_by_the_shapes_of_the_map(
+    start: list[float], leap: list[float], rng: Generator
+) -> None:
+    """As when scans were lost: 2.4 m and a turn; without polylines to compare it is not found."""
+    around = [cast(WALLS, [*start[:2], a], noise=rng) for a in np.linspace(0, 2 * np.pi, 13)]
+    leapt = observed(cast(WALLS, np.add(start, leap), noise=rng))
+    known = line_map(se2.transform_segments(se2.inverse(start), WALLS))
+    with_shapes, without = Tracker(), Tracker()
+    for tracker in (with_shapes, without):
+        tracked_along(tracker, around)
+    [(_, tracked)] = with_shapes.place(leapt, lambda: known)
+    assert without.place(leapt, LineMap.empty) == []
+    off = se2.between(se2.between(start, np.add(start, leap)), tracked.pose)
+    assert np.hypot(off[0], off[1]) < 0.1 and abs(off[2]) < 0.02
+
+
+@pytest.mark.parametrize(("leap", "placed_again"), [(2.2, True), (3.4, False)])
+def test_a_leap_farther_than_a_robot_can_have_got_is_not_believed(
+    leap: float, placed_again: bool, rng: Generator
+) -> None:
+    """However well it fits the known map: scans are tracked over 2.5 m at the most."""
+    start = np.array([13.0, 1.0, 0.0])
+    known = line_map(se2.transform_segments(se2.inverse(start), WALLS))
+    tracker = Tracker()
+    around = [cast(WALLS, [*start[:2], a], noise=rng) for a in np.linspace(0, 2 * np.pi, 13)]
+    tracked_along(tracker, around)
+    leapt = observed(cast(WALLS, start - [0.0, leap, 1.6], noise=rng))
+    assert bool(tracker.place(leapt, lambda: known)) == placed_again
+
+
+def test_what_shapes_propose_is_aligned_to_corresponding_polylines_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A piece of another polyline lies nearer than the true wall; it must not pull (paper, V)."""
+    corner = np.array([[0.0, 0, 4, 0], [4, 0, 4, 3]])
+    pier = np.array([[7.0, 0, 8, 0], [8, 0, 8, 1]])
+    decoy = np.array([[0.0, 0.25, 4, 0.25]])
+    known = LineMap(np.vstack([corner, pier, decoy]), np.array([0, 0, 1, 1, 1]), np.full(5, 9))
+    lines = LineMap(np.vstack([corner, pier]), np.array([0, 0, 1, 1]), np.ones(4, dtype=np.int64))
+    on_polylines, segment = points_on_lines(lines, 0.1)
+    oriented = OrientedPoints(on_polylines.points, on_polylines.normals, segment)
+    scan = cast(WALLS, [9, 1, 0])
+    found = ScanSegments(lines.segments, np.full(len(scan.ranges), -1))
+    seen = Observation(scan, found, oriented, oriented, 0.5)
+    np.testing.assert_array_equal(seen.lines.segments, lines.segments)
+    near = Correspondence(np.array([0.0, 0.2, 0.0]), np.eye(2, dtype=np.bool_))
+    monkeypatch.setattr("mapweave.mapping.tracking.tracker.correspond", lambda *_: [near])
+    [start] = Tracker()._shape_starts(seen, known)
+    np.testing.assert_allclose(start, 0.0, atol=0.01)
+
+
 def test_a_scan_of_another_place_is_not_placed(rng: Generator) -> None:
     scans, _ = scans_along(BUILDING, [(3, 1), (9, 1)], 1)
     tracker = Tracker()
@@ -121,6 +186,20 @@ def test_evidence_counts_for_and_against() -> None:
     assert blocked.evidence.score < again.evidence.score - 0.05
 
 
+def test_a_wall_that_the_scan_sees_through_speaks_against_its_pose() -> None:
+    """A box in the corridor, seen twice, is gone: what was known there is seen through."""
+    box = np.array([[11.0, 1.3, 11, 0.7]])  # faces the robot
+    tracker = Tracker()
+    there = [cast(np.vstack([WALLS, box]), [x, 1.0, 0]) for x in (9.0, 9.4)]
+    tracked_along(tracker, there)
+    gone = placed(tracker, cast(WALLS, [9.2, 1.0, 0]))
+    assert gone is not None
+    assert gone.evidence.seen_through > 0.02
+    seen_again = placed(tracker, there[1])
+    assert seen_again is not None
+    assert seen_again.evidence.seen_through == pytest.approx(0, abs=0.01)
+
+
 def test_an_older_scan_is_placed_without_moving_the_track(rng: Generator) -> None:
     scans, true = scans_along(BUILDING, [(3, 1), (9, 1)], 1)
     tracker = Tracker()
@@ -154,6 +233,29 @@ def test_a_scan_that_people_hide_costs_neither_it_nor_the_way_on(rng: Generator)
     found = tracker.place(observed(cast(WALLS, way[12], noise=rng)), LineMap.empty)
     assert len(found) >= 2  # it, the one before, and the hidden one where that can be made out
     np.testing.assert_allclose(tracker.pose[:2], [way[12][0] - way[0][0], 0], atol=0.1)
+
+
+def test_a_missed_scan_is_placed_when_those_after_it_have_shown_what_it_saw(
+    rng: Generator,
+) -> None:
+    """Round a corner into a room nobody had looked into, and back to where both are in sight."""
+    way = [[x, 1.0, 0.0] for x in np.arange(6, 12.6, 0.5)]
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, pose, noise=rng) for pose in way])
+    inside = np.array([12.5, -1.0, -np.pi / 2])
+    missed = observed(cast(WALLS, inside, noise=rng, angles=FRONT[45:136]))
+    assert tracker.place(missed, LineMap.empty) == []
+    found = [
+        pair
+        for x in (12.8, 13.0)
+        for pair in tracker.place(
+            observed(cast(WALLS, [x, 0.2, -0.8], noise=rng, angles=AROUND)), LineMap.empty
+        )
+    ]
+    [pose] = [tracked.pose for seen, tracked in found if seen is missed]
+    off = se2.between(se2.between(np.array(way[0]), inside), pose)
+    assert np.hypot(off[0], off[1]) < 0.1 and abs(off[2]) < 0.02
+    assert tracker.missed == []
 
 
 def test_a_scan_on_probation_that_the_next_one_does_not_confirm_leaves_no_trace(

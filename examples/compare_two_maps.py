@@ -1,0 +1,21 @@
+"""Tell whether two robots' maps show one place: ``python compare_two_maps.py A.json B.json``."""
+
+import sys
+
+import numpy as np
+
+import mapweave
+
+reference, other = (mapweave.load(path) for path in sys.argv[1:])
+if not (isinstance(reference, mapweave.RobotMap) and isinstance(other, mapweave.RobotMap)):
+    raise SystemExit("expected the maps of two robots, got a joint map")
+
+for alignment in mapweave.align(reference, other):
+    x, y, theta = alignment.transform  # takes coordinates in the other to those in the reference
+    print(f"{alignment.reference} - {alignment.other}: {alignment.decision}")
+    print(f"  {alignment.reason}")
+    if alignment.decision == "accepted":
+        print(
+            f"  {alignment.other} lies at {x:.2f} m, {y:.2f} m, {np.degrees(theta):.1f}°"
+            f" in {alignment.reference}, with a confidence of {alignment.confidence:.3f}"
+        )
