@@ -5,15 +5,27 @@ histogram modulo 2 pi keeps the visible sides apart and serves rotation hypothes
 """
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arguments import as_segments, as_values
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.segments import lengths
+from mapweave.kernels import main_directions as kernel
+from mapweave.kernels.main_directions import LINE_PERIOD, DirectionRules, line_difference
 
-LINE_PERIOD = np.pi
 DIRECTED_PERIOD = 2 * np.pi
+
+__all__ = [
+    "DIRECTED_PERIOD",
+    "LINE_PERIOD",
+    "DirectionParameters",
+    "direction_histogram",
+    "likely_turns",
+    "line_difference",
+    "main_directions",
+    "nearest_direction",
+]
 
 
 class DirectionParameters(BaseModel):
@@ -40,6 +52,11 @@ class DirectionParameters(BaseModel):
         le=1,
         description="depth of the valleys beside a peak, as a share of its height; drops shoulders",
     )
+
+    @property
+    def rules(self) -> DirectionRules:
+        """The same as plain numbers."""
+        return DirectionRules(self.bins, self.smoothing, self.significance, self.separation)
 
 
 def direction_histogram(
@@ -70,10 +87,8 @@ def direction_histogram(
     FloatArray
         (bins,), summing to the sum of the weights.
     """
-    angles, lengths = _angles_and_lengths(segments)
-    index = np.rint(angles * bins / period).astype(np.int64) % bins
-    raw = np.bincount(index, lengths if weights is None else weights, minlength=bins)
-    return np.asarray(scipy.ndimage.gaussian_filter1d(raw, smoothing * bins / period, mode="wrap"))
+    mass = lengths(segments) if weights is None else weights
+    return kernel.direction_histogram(segments, mass, bins, period, smoothing)
 
 
 def main_directions(
@@ -109,14 +124,12 @@ def main_directions(
     """
     chosen = parameters or DirectionParameters()
     given = as_segments("segments", segments)
-    angles, lengths = _angles_and_lengths(given)
-    mass = lengths if weights is None else as_values("weights", weights, len(given), "segment")
-    histogram = direction_histogram(given, mass, bins=chosen.bins, smoothing=chosen.smoothing)
-    if not histogram.any():
-        return np.empty(0)
-    rough = _significant_peaks(histogram, chosen) * LINE_PERIOD / chosen.bins
-    fine = [_mean_about(peak, angles, mass, 2 * chosen.smoothing) for peak in rough]
-    return np.sort(np.mod(fine, LINE_PERIOD))
+    mass = (
+        lengths(given) if weights is None else as_values("weights", weights, len(given), "segment")
+    )
+    return kernel.main_directions(
+        np.ascontiguousarray(given), np.ascontiguousarray(mass), chosen.rules
+    )
 
 
 def likely_turns(
@@ -173,64 +186,4 @@ def nearest_direction(angle: ArrayLike, directions: FloatArray, tolerance: float
     FloatArray
         (...) elements of `directions`, or NaN.
     """
-    asked = np.asarray(angle, dtype=float)
-    if not len(directions):
-        return np.full(asked.shape, np.nan)
-    difference = np.abs(line_difference(asked[..., None], directions))
-    nearest = np.argmin(difference, axis=-1)
-    return np.where(difference.min(axis=-1) <= tolerance, directions[nearest], np.nan)
-
-
-def line_difference(first: ArrayLike, second: ArrayLike) -> FloatArray:
-    """Return the turn from line direction `second` to `first` [rad], in [-pi/2, pi/2)."""
-    turn = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
-    return np.asarray(np.mod(turn + LINE_PERIOD / 2, LINE_PERIOD) - LINE_PERIOD / 2)
-
-
-def _angles_and_lengths(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) directions [rad] and (n,) lengths [m]."""
-    dx, dy = segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1]
-    return np.arctan2(dy, dx), np.hypot(dx, dy)
-
-
-def _significant_peaks(histogram: FloatArray, parameters: DirectionParameters) -> FloatArray:
-    """Return the bins that stand out of the level of a uniform histogram and of their valleys."""
-    bins = len(histogram)
-    around = np.tile(histogram, 3)  # no peak is cut at the ends, no valley missed
-    peaks = local_maxima(around)
-    peaks = peaks[around[peaks] >= parameters.significance * histogram.mean()]
-    deep = prominences(around, peaks) >= parameters.separation * around[peaks]
-    once = (peaks >= bins) & (peaks < 2 * bins)
-    return np.asarray(peaks[deep & once] - bins, dtype=np.float64)
-
-
-def local_maxima(values: FloatArray) -> IntArray:
-    """Return (k,) where `values` (n,) are higher than on both sides; the middle of a plateau."""
-    edges = np.flatnonzero(values[1:] != values[:-1])
-    first, last = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(values) - 1]])
-    level = values[first]
-    higher = (level[1:-1] > level[:-2]) & (level[1:-1] > level[2:])
-    middle: IntArray = (first[1:-1][higher] + last[1:-1][higher]) // 2
-    return middle
-
-
-def prominences(values: FloatArray, peaks: IntArray) -> FloatArray:
-    """Return (k,) how far `peaks` (k,) stand out of the higher one of the valleys beside them.
-
-    A valley reaches from the peak to the next place that is higher than the peak, or to the end.
-    """
-    depths = np.empty(len(peaks))
-    for k, peak in enumerate(peaks.tolist()):
-        higher = np.flatnonzero(values > values[peak])
-        at = int(np.searchsorted(higher, peak))
-        start = higher[at - 1] + 1 if at else 0
-        end = higher[at] if at < len(higher) else len(values)
-        depths[k] = values[peak] - max(values[start : peak + 1].min(), values[peak:end].min())
-    return depths
-
-
-def _mean_about(peak: float, angles: FloatArray, mass: FloatArray, reach: float) -> float:
-    """Return the weighted mean direction [rad] of what lies within `reach` of `peak`."""
-    turn = line_difference(angles, peak)
-    near = np.where(np.abs(turn) <= reach, mass, 0.0)
-    return float(peak + np.dot(near, turn) / near.sum())
+    return kernel.nearest_direction(angle, directions, tolerance)

@@ -1,4 +1,4 @@
-"""Which segments merge, at what cost and into what direction: the rules of merging (paper, VI).
+"""How segments are chosen for merging: the parameters of its rules (paper, VI).
 
 What the paper leaves open, and what we chose:
 
@@ -11,9 +11,9 @@ What the paper leaves open, and what we chose:
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry.arrays import ComplexArray, FloatArray
-from mapweave.lines.directions import DirectionParameters, main_directions, nearest_direction
-from mapweave.lines.merging_cost import CostWeights, Pairs, cost_terms, merged_segments
+from mapweave.kernels.merging_rules import MergingRules
+from mapweave.lines.directions import DirectionParameters
+from mapweave.lines.merging_cost import CostWeights
 from mapweave.parameters import StageParameters, derived
 
 
@@ -66,55 +66,20 @@ class MergingParameters(StageParameters):
     balance: CostWeights = CostWeights()
     directions: DirectionParameters = DirectionParameters()
 
-
-class Pairing:
-    """What pairs cost and become, under the main directions of all segments (VI-A).
-
-    Parameters
-    ----------
-    segments
-        (n, 4) x1 y1 x2 y2 [m]: all of them, for the main directions.
-    weights
-        (n,) what each contributes to these [m].
-    parameters
-        Which are merged, and into what direction.
-    """
-
-    def __init__(
-        self, segments: FloatArray, weights: FloatArray, parameters: MergingParameters
-    ) -> None:
-        self._directions = main_directions(segments, weights, parameters.directions)
-        self._parameters = parameters
-
     @property
-    def reach(self) -> float:
-        """How far apart segments may be that are merged [m]."""
-        return self._parameters.max_gap
-
-    def direction(self, pairs: Pairs) -> ComplexArray:
-        """Return the merging direction ad of each pair, (k,) unit vectors (VI)."""
-        mean = pairs.mean_direction
-        angle = np.angle(mean)
-        main = nearest_direction(angle, self._directions, self._parameters.direction_tolerance)
-        shift = pairs.lengths.max(axis=0) / 2 * np.abs(np.sin(main - angle))
-        followed = shift <= self._parameters.max_shift  # never where `main` is NaN
-        return np.where(followed, np.exp(1j * main), mean)
-
-    def cost(self, pairs: Pairs) -> FloatArray:
-        """Return (k,) what merging costs [m], infinite where it is out of the question."""
-        limits = self._parameters
-        terms = cost_terms(pairs, self.direction(pairs))
-        cost = terms.total(limits.balance)
-        shorter = pairs.lengths.min(axis=0)
-        possible = (
-            ~pairs.turned  # else they show opposite faces
-            & (pairs.cosines >= np.cos(limits.max_angle))
-            & (cost <= limits.max_cost)
-            & (terms.collinearity <= limits.max_step + limits.turn_noise * shorter)
-            & (terms.proximity <= limits.max_gap)
+    def rules(self) -> MergingRules:
+        """The same as plain numbers."""
+        return MergingRules(
+            max_cost=self.max_cost,
+            max_step=self.max_step,
+            max_gap=self.max_gap,
+            max_angle=self.max_angle,
+            turn_noise=self.turn_noise,
+            end_noise=self.end_noise,
+            direction_tolerance=self.direction_tolerance,
+            max_shift=self.max_shift,
+            parallelism=self.balance.parallelism,
+            collinearity=self.balance.collinearity,
+            proximity=self.balance.proximity,
+            directions=self.directions.rules,
         )
-        return np.where(possible, cost, np.inf)
-
-    def merged(self, pairs: Pairs) -> FloatArray:
-        """Return the (k, 4) merged segments x1 y1 x2 y2 [m], directed as the first of each pair."""
-        return merged_segments(pairs, self.direction(pairs), self._parameters.end_noise)

@@ -8,8 +8,8 @@ goes beyond the paper, for its own aim: the fewest segments that represent what 
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry.arrays import FloatArray
-from mapweave.geometry.segments import lengths
+from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.kernels.slivers import sliver_owners
 from mapweave.lines.merging import Evolution
 from mapweave.parameters import StageParameters, derived
 
@@ -34,6 +34,17 @@ class SliverParameters(StageParameters):
     )
 
 
+def owners(segments: FloatArray, parameters: SliverParameters | None = None) -> IntArray:
+    """Return (n,) which of the (n, 4) `segments` [m] takes each over: itself if it is no sliver."""
+    chosen = parameters or SliverParameters()
+    return sliver_owners(
+        np.ascontiguousarray(segments, dtype=np.float64),
+        chosen.max_length,
+        chosen.max_distance,
+        chosen.max_angle,
+    )
+
+
 def absorb_slivers(
     segments: FloatArray, weights: FloatArray, parameters: SliverParameters | None = None
 ) -> Evolution:
@@ -54,33 +65,7 @@ def absorb_slivers(
         The segments that are no slivers, unmoved, in their order; with the weights of the slivers
         that each took over, and where every input went.
     """
-    chosen = parameters or SliverParameters()
-    length = lengths(segments)
-    owner = np.arange(len(segments))
-    for number in np.flatnonzero(length <= chosen.max_length):
-        longer = np.flatnonzero(length > length[number])  # so no two own each other
-        distance = _distance(segments[number], segments[longer], chosen.max_angle)
-        if len(longer) and distance.min() <= chosen.max_distance:
-            owner[number] = longer[np.argmin(distance)]
-    while (owner != owner[owner]).any():  # a sliver of a sliver
-        owner = owner[owner]
+    owner = owners(segments, parameters)
     left, labels = np.unique(owner, return_inverse=True)
     total = np.bincount(labels, weights, minlength=len(left)).astype(np.float64)
     return Evolution(segments[left], total, labels.astype(np.int64))
-
-
-def _distance(sliver: FloatArray, segments: FloatArray, max_angle: float) -> FloatArray:
-    """Return how far `sliver` (4,) reaches away from each (k, 4) segment [m], as (k,).
-
-    Infinite where their directions differ by more than `max_angle` [rad].
-    """
-    start = segments[:, :2]
-    along = segments[:, 2:] - start
-    squared = (along**2).sum(axis=1)
-    reach = np.zeros(len(segments))
-    for end in (sliver[:2], sliver[2:]):
-        share = np.clip(((end - start) * along).sum(axis=1) / squared, 0.0, 1.0)
-        reach = np.maximum(reach, np.hypot(*(end - start - share[:, None] * along).T))
-    own = sliver[2:] - sliver[:2]
-    cosine = along @ own / (np.sqrt(squared) * max(float(np.hypot(*own)), 1e-12))
-    return np.where(cosine >= np.cos(max_angle), reach, np.inf)

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.kernels.denials import Witnesses
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.scan import Scan
-from mapweave.scan.visibility import seen_through
+from mapweave.scan.visibility import clear_ranges
 
 
 class ChangeDetectionParameters(StageParameters):
@@ -82,7 +82,13 @@ def still_there(
     support
         (k,) of theirs: less one for each place from which it was seen through since, but not 0.
     """
-    denied = denials(segments, last_seen, witnesses, parameters)
+    return not_vanished(support, denials(segments, last_seen, witnesses, parameters), parameters)
+
+
+def not_vanished(
+    support: IntArray, denied: IntArray, parameters: ChangeDetectionParameters
+) -> tuple[IntArray, IntArray]:
+    """Return the same as `still_there`, given (n,) from how many places each was seen through."""
     left = np.flatnonzero(denied < parameters.places)
     return left, np.maximum(support - denied, 1)[left]
 
@@ -109,37 +115,27 @@ def denials(
     parameters: ChangeDetectionParameters,
 ) -> IntArray:
     """Return (n,) how many `witnesses` saw through each segment after it was seen last."""
-    points, owner, along = _samples(segments, parameters.spacing)
-    total = np.bincount(owner, minlength=len(segments))
-    counts = np.zeros(len(segments), dtype=np.int64)
+    kernel = no_witnesses(parameters)
     for witness in witnesses:
-        asked = last_seen[owner] < witness.scan.index
-        if not asked.any():
-            continue
-        through = _sees_through(witness, points[asked], along[asked], parameters)
-        seen = np.bincount(owner[asked], weights=through, minlength=len(segments))
-        counts += (seen > 0) & (seen >= parameters.share * total)
-    return counts
+        add_witness(kernel, witness, parameters)
+    return kernel.count(
+        np.ascontiguousarray(segments, dtype=np.float64),
+        np.ascontiguousarray(last_seen, dtype=np.int64),
+    )
 
 
-def _samples(segments: FloatArray, spacing: float) -> tuple[FloatArray, IntArray, FloatArray]:
-    """(m, 2) points on the segments, (m,) whose each is, and (m, 2) the direction there."""
-    run = segments[:, 2:] - segments[:, :2]
-    length = np.hypot(*run.T)
-    count = np.ceil(length / spacing).astype(np.int64) + 1
-    owner = np.repeat(np.arange(len(segments)), count)
-    number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    share = (number + 0.5) / count[owner]
-    points = segments[owner, :2] + share[:, None] * run[owner]
-    return points, owner, (run / np.maximum(length, 1e-12)[:, None])[owner]
+def no_witnesses(parameters: ChangeDetectionParameters) -> Witnesses:
+    """Return where witnesses can be added."""
+    p = parameters
+    return Witnesses(p.spacing, p.clearance, p.incidence, p.share)
 
 
-def _sees_through(
-    witness: Viewpoint, points: FloatArray, along: FloatArray, p: ChangeDetectionParameters
-) -> BoolArray:
-    """(m,) which points `witness` sees through, its beams not running along the segment there."""
-    local = se2.transform_points(se2.inverse(witness.pose), points)
-    beam = points - witness.pose[:2]
-    across = np.abs(beam[:, 0] * along[:, 1] - beam[:, 1] * along[:, 0])
-    steep: BoolArray = across >= np.sin(p.incidence) * np.hypot(*beam.T)
-    return steep & seen_through(witness.scan, local, p.clearance, p.sight)
+def add_witness(
+    witnesses: Witnesses, viewpoint: Viewpoint, parameters: ChangeDetectionParameters
+) -> None:
+    """Add what the scan at `viewpoint` saw through."""
+    angles = viewpoint.scan.angles
+    step = float(angles[-1] - angles[0]) / max(len(angles) - 1, 1)
+    clear = clear_ranges(viewpoint.scan, parameters.sight)
+    pose = np.ascontiguousarray(viewpoint.pose, dtype=np.float64)
+    witnesses.add(viewpoint.scan.index, clear, float(angles[0]), step, pose)

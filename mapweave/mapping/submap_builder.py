@@ -1,5 +1,6 @@
 """A submap while it grows: G_t from G_(t-1) and S_t (paper, V and VI)."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,16 +10,18 @@ from shapely.geometry.base import BaseGeometry
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.lines.fitting import FittingParameters
-from mapweave.lines.merging import MergingParameters, count_support, merge_scan
+from mapweave.lines.merging import MergingParameters, count_support, evolving_map
 from mapweave.lines.polylines import group_polylines
 from mapweave.lines.selection import SelectionParameters
 from mapweave.lines.simplification import SimplificationParameters, simplify, sources
-from mapweave.lines.slivers import SliverParameters, absorb_slivers
+from mapweave.lines.slivers import SliverParameters, owners
 from mapweave.mapping.change_detection import (
     ChangeDetectionParameters,
     Viewpoint,
+    add_witness,
     last_sightings,
-    still_there,
+    no_witnesses,
+    not_vanished,
 )
 from mapweave.mapping.tracking.pose_covariance import EXACT
 from mapweave.maps import LineMap, Trajectory
@@ -60,17 +63,26 @@ class SubmapParameters(StageParameters):
     )
 
 
-@dataclass(slots=True)
-class _Seen:
-    """Segments as scans saw them, (n, 4) [m]; which scan, and which merged segment they are in."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Standing:
+    """What has not vanished of the merged segments, slivers absorbed.
+
+    Attributes
+    ----------
+    segments
+        (m, 4) all that are merged, slivers too [m].
+    owner
+        (m,) which of them takes each over.
+    left
+        (k,) which of them are left, ascending.
+    support
+        (k,) how many scans saw each, less those that saw through it.
+    """
 
     segments: FloatArray
-    labels: IntArray
-    scans: IntArray
-
-    @classmethod
-    def none(cls) -> "_Seen":
-        return cls(np.empty((0, 4)), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+    owner: IntArray
+    left: IntArray
+    support: IntArray
 
 
 class SubmapBuilder:
@@ -78,11 +90,11 @@ class SubmapBuilder:
 
     def __init__(self, parameters: SubmapParameters) -> None:
         self._parameters = parameters
-        self._segments: FloatArray = np.empty((0, 4))
-        self._weights: FloatArray = np.empty(0)
-        self._sightings = _Seen.none()
+        self._map = evolving_map(np.empty((0, 4)), np.empty(0), parameters.merging)
+        self._sightings: list[FloatArray] = []  # of each scan, in the submap's frame
         self._cleared: list[BaseGeometry] = []
-        self._witnesses: list[Viewpoint] = []
+        self._witnesses = no_witnesses(parameters.change_detection)  # the scans that cleared it
+        self._witness_pose: FloatArray | None = None  # of the last
         self._indices: list[int] = []
         self._stamps: list[float] = []
         self._poses: list[FloatArray] = []
@@ -115,9 +127,9 @@ class SubmapBuilder:
         The (4,) `uncertainty` of the pose, as of a `Trajectory`, is kept with it.
         """
         if self._poses:
-            step = se2.between(self._poses[-1], pose)
-            self._path += float(np.hypot(step[0], step[1]))
-            self._turned += abs(float(step[2]))
+            step, turn = _motion(self._poses[-1], pose)
+            self._path += step
+            self._turned += turn
         self._indices.append(scan.index)
         self._stamps.append(scan.stamp)
         self._poses.append(pose)
@@ -137,13 +149,15 @@ class SubmapBuilder:
 
     def line_map(self) -> LineMap:
         """Return the lines, simplified, and the free space seen so far."""
-        p, seen = self._parameters, self._sightings
+        p = self._parameters
         free = unite(self._cleared, p.free_space)
-        merged, labels, left, _ = self._standing()
-        kept = np.flatnonzero(np.isin(labels, left))
-        sightings, scans = seen.segments[kept], seen.scans[kept]
+        standing = self._standing()
+        kept = np.flatnonzero(np.isin(standing.owner[self._map.labels()], standing.left))
+        counts = [len(segments) for segments in self._sightings]
+        sightings = np.concatenate([np.empty((0, 4)), *self._sightings])[kept]
+        scans = np.repeat(np.array(self._indices, dtype=np.int64), counts)[kept]
         once = np.ones(len(kept), dtype=np.int64)
-        walls = simplify(merged[left], sightings, once, free, p.simplification)
+        walls = simplify(standing.segments[standing.left], sightings, once, free, p.simplification)
         wall, source = sources(walls, sightings, p.simplification)
         found, labels = np.unique(wall, return_inverse=True)
         lines = self._grouped(walls[found], *self._still_there(walls[found], labels, scans[source]))
@@ -151,46 +165,48 @@ class SubmapBuilder:
 
     def lines(self) -> LineMap:
         """Return the lines alone, not simplified: fast enough for every scan."""
-        merged, _, left, support = self._standing()
-        return self._grouped(merged, left, support)
+        standing = self._standing()
+        return self._grouped(standing.segments, standing.left, standing.support)
 
-    def _standing(self) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-        """Return merged segments, whose each sighting is, which are left, and their support."""
-        whole = absorb_slivers(self._segments, self._weights, self._parameters.slivers)
-        labels = whole.labels[self._sightings.labels]
-        left, support = self._still_there(whole.segments, labels, self._sightings.scans)
-        return whole.segments, labels, left, support
+    def _standing(self) -> _Standing:
+        segments = self._map.segments()
+        owner = owners(segments, self._parameters.slivers)
+        whole = np.flatnonzero(owner == np.arange(len(owner)))
+        support, last = self._map.seen(owner)
+        numbers = self._map.numbers()[whole]
+        denied = self._witnesses.count_numbered(numbers, segments[whole], last[whole])
+        left, remaining = not_vanished(support[whole], denied, self._parameters.change_detection)
+        return _Standing(segments, owner, whole[left], remaining)
 
     def _still_there(
         self, segments: FloatArray, labels: IntArray, scans: IntArray
     ) -> tuple[IntArray, IntArray]:
         """Return which segments were not seen through since they were seen, and their support."""
-        support, last = count_support(labels, scans), last_sightings(labels, scans)
-        return still_there(
-            segments, support, last, self._witnesses, self._parameters.change_detection
-        )
+        denied = self._witnesses.count(segments, last_sightings(labels, scans))
+        support = count_support(labels, scans)
+        return not_vanished(support, denied, self._parameters.change_detection)
 
     def _grouped(self, segments: FloatArray, left: IntArray, support: IntArray) -> LineMap:
         order, polyline = group_polylines(segments[left], self._parameters.max_gap)
-        return LineMap(segments[left][order], polyline, support[order])
+        return LineMap(segments[left[order]], polyline, support[order])
 
     def _merge(self, scan: int, segments: FloatArray) -> None:
-        evolution = merge_scan(self._segments, self._weights, segments, self._parameters.merging)
-        known = evolution.labels[: len(self._segments)]
-        fresh = evolution.labels[len(self._segments) :]
-        self._sightings = _Seen(
-            np.concatenate([self._sightings.segments, segments]),
-            np.concatenate([known[self._sightings.labels], fresh]),
-            np.concatenate([self._sightings.scans, np.full(len(fresh), scan)]),
-        )
-        self._segments, self._weights = evolution.segments, evolution.weights
+        self._map.merge_scan(np.ascontiguousarray(segments), scan)
+        self._sightings.append(segments)
 
     def _clear(self, scan: Scan, pose: FloatArray) -> None:
         """Note what `scan` saw through, unless a scan from about here did already."""
         p = self._parameters
-        if self._witnesses:
-            x, y, turn = se2.between(self._witnesses[-1].pose, pose)
-            if np.hypot(x, y) < p.free_space_step and abs(turn) < p.free_space_turn:
+        if self._witness_pose is not None:
+            step, turn = _motion(self._witness_pose, pose)
+            if step < p.free_space_step and turn < p.free_space_turn:
                 return
         self._cleared.append(scan_free_space(scan, pose, p.free_space))
-        self._witnesses.append(Viewpoint(scan, pose))
+        self._witness_pose = pose
+        add_witness(self._witnesses, Viewpoint(scan, pose), p.change_detection)
+
+
+def _motion(start: FloatArray, end: FloatArray) -> tuple[float, float]:
+    """Return how far a pose is from another [m], and how much it is turned [rad]."""
+    x, y, turn = (end - start).tolist()
+    return math.hypot(x, y), abs(math.remainder(turn, 2 * math.pi))

@@ -9,9 +9,10 @@ import pytest
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.io.readers import read_reference_poses, read_scans
+from mapweave.kernels.merging_cost import Pairs
+from mapweave.kernels.merging_rules import Pairing
 from mapweave.lines.merging import Evolution, MergingParameters, count_support, evolve, merge_scan
-from mapweave.lines.merging_cost import Pairs, merge_cost
-from mapweave.lines.merging_rules import Pairing
+from mapweave.lines.merging_cost import merge_cost
 from mapweave.lines.slivers import absorb_slivers
 from mapweave.scan.segmentation import extract_segments
 
@@ -65,7 +66,7 @@ def merges(first: list[float], second: list[float]) -> bool:
 def naive_evolution(segments: FloatArray, parameters: MergingParameters) -> Evolution:
     """Compare all pairs before every merge, and merge the cheapest."""
     weights = lengths_of(segments)
-    pairing = Pairing(segments, weights, parameters)
+    pairing = Pairing(segments, weights, parameters.rules)
     groups = [{i} for i in range(len(segments))]
     while True:
         younger, older = np.tril_indices(len(segments), -1)

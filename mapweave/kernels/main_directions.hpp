@@ -1,0 +1,128 @@
+// Main directions: significant peaks of the direction histogram (paper, VI-A).
+// The twin and the words are in main_directions.py.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "arrays.hpp"
+
+namespace main_directions {
+
+constexpr double kPeriod = 3.141592653589793238462643383280;  // of the directions of lines [rad]
+
+struct Rules {
+  int64_t bins;
+  double smoothing, significance, separation;
+
+  static Rules of(nb::handle given) {
+    return {nb::cast<int64_t>(given.attr("bins")), nb::cast<double>(given.attr("smoothing")),
+            nb::cast<double>(given.attr("significance")), nb::cast<double>(given.attr("separation"))};
+  }
+};
+
+// From line direction `second` to `first` [rad], in [-pi/2, pi/2).
+inline double line_difference(double first, double second) {
+  const double turn = first - second + kPeriod / 2;
+  return turn - kPeriod * std::floor(turn / kPeriod) - kPeriod / 2;
+}
+
+inline std::vector<double> smoothed(const std::vector<double>& raw, double sigma) {
+  const int64_t bins = static_cast<int64_t>(raw.size());
+  const int64_t radius = static_cast<int64_t>(4.0 * sigma + 0.5);
+  std::vector<double> tap(radius + 1);
+  double sum = 0.0;
+  for (int64_t k = 0; k <= radius; ++k) tap[k] = std::exp(-0.5 / (sigma * sigma) * static_cast<double>(k * k));
+  for (int64_t k = -radius; k <= radius; ++k) sum += tap[std::abs(k)];
+  for (double& each : tap) each /= sum;
+  const auto at = [&](int64_t i) { return raw[static_cast<size_t>(((i % bins) + bins) % bins)]; };
+  std::vector<double> smooth(raw.size());
+  for (int64_t i = 0; i < bins; ++i) {
+    double value = raw[i] * tap[0];
+    for (int64_t k = radius; k >= 1; --k) {
+      const bool inside = i >= k && i + k < bins;
+      value += (inside ? raw[i - k] + raw[i + k] : at(i - k) + at(i + k)) * tap[k];
+    }
+    smooth[i] = value;
+  }
+  return smooth;
+}
+
+// How far a peak stands above the higher one of the valleys beside it.
+inline double prominence(const std::vector<double>& around, int64_t peak) {
+  const int64_t count = static_cast<int64_t>(around.size());
+  double left = around[peak], right = around[peak];
+  for (int64_t i = peak; i >= 0 && around[i] <= around[peak]; --i) left = std::min(left, around[i]);
+  for (int64_t i = peak; i < count && around[i] <= around[peak]; ++i) right = std::min(right, around[i]);
+  return around[peak] - std::max(left, right);
+}
+
+// The bins that stand out of the level of a uniform histogram and of their valleys.
+inline std::vector<int64_t> significant_peaks(const std::vector<double>& histogram, const Rules& rules) {
+  const int64_t bins = static_cast<int64_t>(histogram.size());
+  std::vector<double> around;
+  for (int k = 0; k < 3; ++k) around.insert(around.end(), histogram.begin(), histogram.end());
+  double total = 0.0;
+  for (const double each : histogram) total += each;
+  const double height = rules.significance * (total / static_cast<double>(bins));
+  std::vector<int64_t> peaks;
+  for (int64_t i = 1; i + 1 < 3 * bins; ++i) {
+    if (!(around[i - 1] < around[i])) continue;
+    int64_t last = i;
+    while (last + 1 < 3 * bins && around[last + 1] == around[i]) ++last;
+    const int64_t peak = (i + last) / 2;
+    if (last + 1 < 3 * bins && around[last + 1] < around[i] && peak >= bins && peak < 2 * bins &&
+        around[peak] >= height && prominence(around, peak) >= rules.separation * around[peak])
+      peaks.push_back(peak - bins);
+    i = last;
+  }
+  return peaks;
+}
+
+// Ascending, in [0, pi); `angles` [rad] count with their `mass`.
+inline std::vector<double> find(const std::vector<double>& angles, const std::vector<double>& mass, const Rules& rules) {
+  const double per_bin = kPeriod / static_cast<double>(rules.bins);
+  std::vector<double> raw(static_cast<size_t>(rules.bins), 0.0);
+  for (size_t i = 0; i < angles.size(); ++i) {
+    const int64_t bin = static_cast<int64_t>(std::nearbyint(angles[i] * static_cast<double>(rules.bins) / kPeriod));
+    raw[static_cast<size_t>((bin % rules.bins + rules.bins) % rules.bins)] += mass[i];
+  }
+  const std::vector<double> histogram = smoothed(raw, rules.smoothing / per_bin);
+  std::vector<double> directions;
+  if (std::all_of(histogram.begin(), histogram.end(), [](double each) { return each == 0.0; })) return directions;
+  for (const int64_t bin : significant_peaks(histogram, rules)) {
+    const double peak = static_cast<double>(bin) * kPeriod / static_cast<double>(rules.bins);
+    double sum = 0.0, near = 0.0;
+    for (size_t i = 0; i < angles.size(); ++i) {
+      const double turn = line_difference(angles[i], peak);
+      if (std::abs(turn) <= 2 * rules.smoothing) sum += mass[i] * turn, near += mass[i];
+    }
+    const double fine = near > 0 ? peak + sum / near : peak;
+    directions.push_back(fine - kPeriod * std::floor(fine / kPeriod));
+  }
+  std::sort(directions.begin(), directions.end());
+  return directions;
+}
+
+inline Out<double> of_segments(In<double, 2> segments, In<double, 1> weights, nb::handle given) {
+  const size_t n = segments.shape(0);
+  if (segments.shape(1) != 4 || weights.shape(0) != n)
+    throw std::invalid_argument("segments: (n, 4), weights: (n,) expected");
+  const Rules rules = Rules::of(given);
+  if (!(rules.bins >= 1 && rules.smoothing > 0)) throw std::invalid_argument("bins, smoothing: > 0 expected");
+  std::vector<double> angles(n);
+  for (size_t i = 0; i < n; ++i) {
+    const double* s = segments.data() + 4 * i;
+    angles[i] = std::atan2(s[3] - s[1], s[2] - s[0]);
+    if (!std::isfinite(angles[i])) throw std::invalid_argument("segments: finite numbers expected");
+  }
+  std::vector<double> found = find(angles, std::vector<double>(weights.data(), weights.data() + n), rules);
+  const size_t count = found.size();
+  return give(std::move(found), {count});
+}
+
+}  // namespace main_directions
+
+inline void bind_main_directions(nb::module_& m) {
+  m.def("main_directions", &main_directions::of_segments, nb::arg("segments"), nb::arg("weights"), nb::arg("rules"));
+}
