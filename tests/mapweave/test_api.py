@@ -18,7 +18,7 @@ import mapweave.shape
 from mapweave.errors import ArgumentError, FinishedError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.reasons import Reason
+from mapweave.reasons import Reason, ReasonKind
 from tests.mapweave.buildings import BUILDING, cast, scans_along, tour, walls_of
 
 PACKAGES = ["mapweave", "mapweave.scan", "mapweave.lines", "mapweave.shape"]
@@ -161,7 +161,8 @@ def test_maps_of_one_robot_and_alignments_of_others_are_not_fused() -> None:
     empty = mapweave.RobotMap("a", "0", 0, ())
     with pytest.raises(ArgumentError, match=r"^maps: .* two of robot 'a'"):
         mapweave.fuse([empty, empty])
-    foreign = mapweave.Alignment("x/0", "y/0", np.zeros(3), "refused", 0.0, Reason.words("unlike"))
+    unlike = Reason(ReasonKind.NO_SHAPE)
+    foreign = mapweave.Alignment("x/0", "y/0", np.zeros(3), "refused", 0.0, unlike)
     with pytest.raises(ArgumentError, match=r"^alignments: .* got 'x/0'"):
         mapweave.fuse([empty], [foreign])
 
