@@ -15,10 +15,12 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from mapweave.config import Config
 from mapweave.errors import MapweaveError
+
+if TYPE_CHECKING:
+    from mapweave.config import Config
 
 T = TypeVar("T")
 
@@ -85,7 +87,7 @@ def add_config_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def config_of(options: argparse.Namespace) -> Config:
+def config_of(options: argparse.Namespace) -> "Config":
     """Return the configuration that ``--config`` and the environment make of the defaults.
 
     Raises
@@ -93,6 +95,8 @@ def config_of(options: argparse.Namespace) -> Config:
     ConfigError
         If there is something wrong with either.
     """
+    from mapweave.config import Config  # --help need not load pydantic
+
     return Config.load(options.config, os.environ)
 
 

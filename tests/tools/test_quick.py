@@ -54,7 +54,7 @@ def files() -> list[str]:
         ("mapweave/geometry/se2.py", "tests/mapweave/geometry/test_se2.py"),
         ("agent/mapweave_agent/agent.py", "tests/agent/test_agent.py"),
         ("mapweave/commands/map.py", "tests/mapweave/commands/test_commands.py"),
-        ("README.md", "tests/test_readme.py"),
+        ("README.md", "tests/test_documents.py"),
         ("tests/agent/conftest.py", "tests/agent/test_agent.py"),
     ],
 )
