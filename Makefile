@@ -2,6 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+KERNELS := .venv/.kernels
 
 WHEEL_BIN := .venv-wheel/bin
 PACKAGES := mapweave protocol agent fusion_server deploy
@@ -18,12 +19,17 @@ $(STAMP): pyproject.toml
 		{ echo "mapweave needs Python 3.11 or newer; name one with: make PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv --clear .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@ $(KERNELS)
+
+# Compiled again when their sources change; where nothing can be compiled, NumPy does their work.
+$(KERNELS): $(STAMP) mapweave/kernels/CMakeLists.txt $(wildcard mapweave/kernels/*.[ch]pp)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
-demo: $(STAMP)
+demo: $(KERNELS)
 	$(BIN)/mapweave team --world office --robots 3 --output demo
 
-lint: $(STAMP)
+lint: $(KERNELS)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -31,11 +37,11 @@ lint: $(STAMP)
 	$(BIN)/mypy examples/*.py
 	$(BIN)/lint-imports
 
-format: $(STAMP)
+format: $(KERNELS)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-dist/.built: $(STAMP) $(SOURCES)
+dist/.built: $(KERNELS) $(SOURCES)
 	rm -rf dist
 	$(BIN)/python -m build --quiet
 	@touch $@
@@ -52,7 +58,7 @@ test: lint .venv-wheel/.installed
 test-all: lint .venv-wheel/.installed
 	$(TEST_WHEEL)
 
-quick: $(STAMP)
+quick: $(KERNELS)
 	$(BIN)/python -m tools.quick $(BASE)
 
 matrix: dist/.built
@@ -62,22 +68,22 @@ durations: .venv-wheel/.installed
 	$(TEST_WHEEL) -q -m 'not slow' --junitxml=.pytest_cache/durations.xml
 	$(BIN)/python -m tools.durations .pytest_cache/durations.xml
 
-mutations: $(STAMP)
+mutations: $(KERNELS)
 	$(BIN)/python -m benchmarks mutations
 
-bench: $(STAMP)
+bench: $(KERNELS)
 	$(BIN)/python -m benchmarks
 
 .PHONY: docs
-docs: $(STAMP)
+docs: $(KERNELS)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs/reference site
 
-bench-map: $(STAMP)
+bench-map: $(KERNELS)
 	$(BIN)/python -m benchmarks map
 	$(BIN)/python -m benchmarks kidnap
 
-bench-fusion: $(STAMP)
+bench-fusion: $(KERNELS)
 	$(BIN)/python -m benchmarks fusion
 
 # What was made of the sources; results (demo, team, bench) stay.

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from mapweave.errors import MapweaveError
+from mapweave.kernels.loading import missing
 
 if TYPE_CHECKING:
     from mapweave.config import Config
@@ -153,7 +154,10 @@ def _run(words: list[str]) -> int:
     command: Command = points[words[0]].load()
     parser = argparse.ArgumentParser(prog=f"mapweave {words[0]}", description=command.summary)
     command.configure(parser)
-    return command.run(parser.parse_args(words[1:]))
+    options = parser.parse_args(words[1:])
+    if told := missing():
+        print(f"mapweave: {told}", file=sys.stderr)  # noqa: T201
+    return command.run(options)
 
 
 def _report(words: list[str]) -> int:

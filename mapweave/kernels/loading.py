@@ -18,3 +18,13 @@ def load_compiled() -> ModuleType | None:
 
 
 COMPILED = load_compiled()
+
+
+def missing() -> str | None:
+    """Return a line for a person where kernels are wanted and were not compiled, else None."""
+    if COMPILED is not None or os.environ.get(PURE, "0") not in ("", "0"):
+        return None
+    return (
+        "kernels were not compiled at installation (no C++ compiler, or no Python headers?):"
+        " the same maps, some ten times slower"
+    )
