@@ -1,12 +1,17 @@
 // The compiled kernels, one file each; every one has its NumPy twin in the module of its name.
 #include <nanobind/nanobind.h>
 
+#include "clearing.hpp"
 #include "correlative.hpp"
 #include "denials.hpp"
+#include "evidence.hpp"
 #include "main_directions.hpp"
 #include "merging.hpp"
+#include "multiview.hpp"
 #include "point_map.hpp"
+#include "polygons.hpp"
 #include "polylines.hpp"
+#include "scores.hpp"
 #include "segmentation.hpp"
 #include "slivers.hpp"
 #include "viewpoints.hpp"
@@ -15,12 +20,17 @@ namespace nb = nanobind;
 
 NB_MODULE(_compiled, m) {
   m.doc() = "Compiled inner loops; see the modules beside for what they compute.";
+  bind_clearing(m);
   bind_correlative(m);
   bind_denials(m);
+  bind_evidence(m);
   bind_main_directions(m);
   bind_merging(m);
+  bind_multiview(m);
   bind_point_map(m);
+  bind_polygons(m);
   bind_polylines(m);
+  bind_scores(m);
   bind_segmentation(m);
   bind_slivers(m);
   bind_viewpoints(m);

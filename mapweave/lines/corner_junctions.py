@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-import shapely
 from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.polygons import edges_of
 from mapweave.geometry.segments import cross, units
+from mapweave.kernels.polygons import lengths_inside
 from mapweave.parameters import StageParameters, derived
 
 
@@ -132,9 +133,7 @@ def length_inside(paths: FloatArray, free: BaseGeometry) -> FloatArray:
     FloatArray
         (k,) [m].
     """
-    if not len(paths):
-        return np.empty(0)
-    return np.asarray(shapely.length(shapely.intersection(shapely.linestrings(paths), free)))
+    return lengths_inside(paths, edges_of(free)) if len(paths) else np.empty(0)
 
 
 def _cheapest(found: _Meetings, allowed: IntArray) -> IntArray:

@@ -6,12 +6,13 @@ wall that is bent, or was seen twice at different places.
 """
 
 import numpy as np
-import shapely
 from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.polygons import edges_of
 from mapweave.geometry.segments import units
+from mapweave.kernels.polygons import depths
 from mapweave.lines.directions import line_difference, nearest_direction
 from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.parameters import StageParameters, derived
@@ -181,15 +182,23 @@ def _is_opening(
 
     Far along a wall the returns are so far apart that a scan draws the wall across an open door.
     """
-    typical = np.zeros(len(segments))
-    for k in np.unique(segment):
-        typical[k] = np.median(shown[segment == k])
-    weak = shown < p.opening_share * typical[segment]
+    weak = shown < p.opening_share * _medians(segment, shown)[segment]
     directions, _ = units(segments[segment[weak]])
     places = segments[segment[weak], :2] + ((station[weak] + 0.5) * p.station)[:, None] * directions
     opening = np.zeros(len(segment), dtype=np.bool_)
-    opening[weak] = shapely.contains_xy(shapely.buffer(free, -p.opening_depth), *places.T)
+    opening[weak] = depths(places, edges_of(free), 2 * p.opening_depth) > p.opening_depth
     return opening
+
+
+def _medians(group: IntArray, values: FloatArray) -> FloatArray:
+    """(g,) the median of the (n,) `values` of each (n,) `group`; 0 for one without."""
+    ascending = values[np.lexsort((values, group))]
+    count = np.bincount(group)
+    start, known = np.cumsum(count) - count, np.flatnonzero(count)
+    medians = np.zeros(len(count))
+    low, high = (start + half for half in ((count - 1) // 2, count // 2))
+    medians[known] = (ascending[low[known]] + ascending[high[known]]) / 2
+    return medians
 
 
 def _runs(

@@ -9,10 +9,10 @@ nothing more, which is why no wall is doubled.
 """
 
 import numpy as np
-import scipy
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.kernels.evidence import take_greedily
 from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.parameters import StageParameters, derived
 
@@ -74,16 +74,16 @@ def select(
         max(parameters.tolerance, parameters.shadow),
     )
     explains = explained(near, parameters)
-    settled = explains | shadowed(near, parameters)
     # What a segment denies, being close in front of or behind it, counts against it.
-    worth = scipy.sparse.csr_array(
-        (
-            np.where(explains, 1.0, -1.0)[settled],
-            (near.segment[settled], near.sample[settled]),
-        ),
-        shape=(len(candidates), len(evidence)),
+    settled = explains | shadowed(near, parameters)
+    return take_greedily(
+        len(candidates),
+        near.segment[settled],
+        near.sample[settled],
+        explains[settled],
+        evidence.weights,
+        price,
     )
-    return _greedily(worth, evidence.weights, price)
 
 
 def explained(near: Nearness, parameters: SelectionParameters) -> BoolArray:
@@ -98,17 +98,3 @@ def shadowed(near: Nearness, parameters: SelectionParameters) -> BoolArray:
     inside = near.distance <= np.abs(near.across) + 1e-9
     same = near.cosine >= np.cos(parameters.parallel)
     return np.asarray(inside & same & (np.abs(near.across) <= parameters.shadow))
-
-
-def _greedily(worth: "scipy.sparse.csr_array", weights: FloatArray, price: float) -> IntArray:
-    """Take the row of the greatest worth, drop the columns it settles, and again."""
-    of_sample = worth.T.tocsr()
-    left = weights.copy()
-    gain = worth @ left
-    chosen: list[int] = []
-    while len(gain) and gain[best := int(np.argmax(gain))] > price:
-        chosen.append(best)
-        samples = worth.indices[worth.indptr[best] : worth.indptr[best + 1]]
-        gain -= of_sample[samples].T @ left[samples]
-        left[samples] = 0.0
-    return np.array(chosen, dtype=np.int64)

@@ -7,10 +7,10 @@ their sightings stand for them: a segment seen by 30 scans is 30 times its lengt
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.geometry.segments import sample, units
+from mapweave.geometry.segments import sample
+from mapweave.kernels.evidence import gather, near_pairs
 
 DIRECTION_BINS = 24  # of a full turn: sightings 15° apart are gathered
 
@@ -59,20 +59,9 @@ class Sightings:
 
     def gathered(self) -> "Sightings":
         """Return the same evidence in fewer samples: the mean of those that hardly differ."""
-        cells = np.floor(self.points / (self.spacing / 2)).astype(np.int64)
-        turn = np.arctan2(self.directions[:, 1], self.directions[:, 0]) / (2 * np.pi)
-        bins = np.floor(turn * DIRECTION_BINS).astype(np.int64) % DIRECTION_BINS
-        low = cells.min(axis=0, initial=0)
-        i, j = (cells - low).T
-        _, group = np.unique(
-            (i * (j.max(initial=0) + 1) + j) * DIRECTION_BINS + bins, return_inverse=True
+        points, directions, weights = gather(
+            self.points, self.directions, self.weights, self.spacing / 2, DIRECTION_BINS
         )
-        weights = np.bincount(group, self.weights).astype(np.float64)
-        points, directions = (
-            np.column_stack([np.bincount(group, self.weights * x) / weights for x in rows.T])
-            for rows in (self.points, self.directions)
-        )
-        directions /= np.hypot(*directions.T)[:, None]
         return Sightings(points, directions, weights, self.spacing)
 
 
@@ -114,12 +103,4 @@ class Nearness:
         reach
             [m] from a segment at most.
         """
-        tree = shapely.STRtree(shapely.points(points))
-        lines = shapely.linestrings(segments.reshape(-1, 2, 2))
-        segment, sample = tree.query(lines, predicate="dwithin", distance=reach)
-        own, lengths = units(segments)
-        (u, v), (x, y) = own[segment].T, (points[sample] - segments[segment, :2]).T
-        along, across = u * x + v * y, u * y - v * x
-        beyond = np.maximum(np.maximum(-along, along - lengths[segment]), 0.0)
-        cosine = (own[segment] * directions[sample]).sum(axis=1)
-        return cls(segment, sample, along, across, np.hypot(across, beyond), cosine)
+        return cls(*near_pairs(segments, points, directions, reach))

@@ -104,12 +104,13 @@ def sources(
     near = Nearness.of(segments, points, directions, p.placement.tolerance)
     along = np.flatnonzero(near.cosine >= np.cos(p.placement.parallel))
     segment, source = near.segment[along], owner[near.sample[along]]
-    pairs, place = np.unique(np.column_stack([segment, source]), axis=0, return_inverse=True)
-    shared = np.bincount(place.ravel(), lengths[near.sample[along]], minlength=len(pairs))
+    keys, place = np.unique(segment * len(sightings) + source, return_inverse=True)
+    shared = np.bincount(place, lengths[near.sample[along]], minlength=len(keys))
+    segment, source = np.divmod(keys, max(len(sightings), 1))
     _, wall = units(segments)
     _, seen = units(sightings)
-    enough = shared >= np.minimum(wall[pairs[:, 0]], seen[pairs[:, 1]]) / 2
-    return pairs[enough, 0], pairs[enough, 1]
+    enough = shared >= np.minimum(wall[segment], seen[source]) / 2
+    return segment[enough], source[enough]
 
 
 def _placed(

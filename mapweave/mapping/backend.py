@@ -49,6 +49,8 @@ class FinishedSubmap:
         The newest; its id is the count of those before it.
     scans
         The scans of its trajectory, in that order.
+    growing
+        What it was built by.
     follows
         Whether it was tracked from the submap before it.
     spare
@@ -57,6 +59,7 @@ class FinishedSubmap:
 
     submap: Submap
     scans: tuple[Observation, ...]
+    growing: SubmapBuilder
     follows: bool
     spare: int
 
@@ -136,10 +139,10 @@ class Backend:
         compared = self._loops.compare(submaps)
         oriented = [seen.oriented for seen in finished.scans]
         at = self._kidnap_detector.find(submaps, oriented, compared, finished.follows and count > 0)
-        parts = [(finished.submap, finished.scans)]
+        parts = [_Part(finished.submap, finished.scans, finished.growing)]
         if at is not None:
             parts = _cut(finished, at, self._parameters.submap)
-            submaps = self._departed(submaps, at, [part for part, _ in parts])
+            submaps = self._departed(submaps, at, [part.submap for part in parts])
             self._tracked = submaps[-1].id - at.submap + 1 if len(parts) == 1 else 1
         submaps, joints = self._component_merger.reunite(submaps, self._tracked)
         for older, younger in joints:
@@ -147,9 +150,7 @@ class Backend:
         if joints or at is not None:
             self._kidnap_detector.forget()
         submaps = self._loops.close(submaps, compared if at is None and not joints else None)
-        renewed = [
-            self._refined(submaps, submaps[count + k], scans) for k, (_, scans) in enumerate(parts)
-        ]
+        renewed = [self._refined(submaps, submaps[count + k], part) for k, part in enumerate(parts)]
         self._submaps = [*submaps[:count], *renewed]
         component = np.array([s.component for s in self._submaps])
         poses = np.array([s.pose for s in self._submaps])
@@ -168,40 +169,46 @@ class Backend:
         gone = [replace(s, component=component) for s in older[at.submap :]]
         return [*kept, *gone, *parts]
 
-    def _refined(
-        self, submaps: Sequence[Submap], newest: Submap, scans: Sequence[Observation]
-    ) -> Submap:
-        """Refine `newest` against those of `submaps` it is linked with, and merge it again."""
+    def _refined(self, submaps: Sequence[Submap], newest: Submap, part: "_Part") -> Submap:
+        """Refine `newest` against those of `submaps` it is linked with."""
         p = self._parameters
         linked = [submaps[k] for k in self._loops.graph.neighbours(newest.id)]
         poses = refine(
-            [seen.oriented for seen in scans],
+            [seen.oriented for seen in part.scans],
             newest.trajectory.pose,
             _walls(linked, newest.pose, p.spacing),
             p.refinement,
         )
-        growing = _merged(scans, poses, newest.trajectory.uncertainty, p.submap)
+        growing = part.growing.moved_to(poses)
         return replace(newest, map=growing.line_map(), trajectory=growing.trajectory())
 
 
-def _cut(
-    finished: FinishedSubmap, at: Kidnapping, parameters: SubmapParameters
-) -> list[tuple[Submap, tuple[Observation, ...]]]:
-    """Return the parts of a submap before and from `at` on, each with its scans.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """A finished submap or a part of one, with its scans and what it was built by."""
+
+    submap: Submap
+    scans: tuple[Observation, ...]
+    growing: SubmapBuilder
+
+
+def _cut(finished: FinishedSubmap, at: Kidnapping, parameters: SubmapParameters) -> list[_Part]:
+    """Return the parts of a submap before and from `at` on.
 
     The latter is in a component anew; the former is left out where it is empty.
     """
     submap, scans = finished.submap, finished.scans
     if at.submap < submap.id or at.scan == 0:
-        return [(replace(submap, component=finished.spare), scans)]
+        return [_Part(replace(submap, component=finished.spare), scans, finished.growing)]
     numbers = (submap.id, submap.component), (submap.id + 1, finished.spare)
     spans = slice(at.scan), slice(at.scan, None)
     parts = []
     for (number, component), span in zip(numbers, spans, strict=True):
         path = _part(submap.trajectory, span)
-        lines = _merged(scans[span], path.pose, path.uncertainty, parameters).line_map()
+        growing = _merged(scans[span], path.pose, path.uncertainty, parameters)
+        lines = growing.line_map()
         part = replace(submap, id=number, component=component, map=lines, trajectory=path)
-        parts.append((part, scans[span]))
+        parts.append(_Part(part, scans[span], growing))
     return parts
 
 

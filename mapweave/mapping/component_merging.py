@@ -8,6 +8,8 @@ for where the robot was when it lost track of the one before; what both saw deci
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
+from heapq import nlargest
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -19,7 +21,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.mapping.place_recognition import PlaceRecognitionParameters, PlaceRecognizer
-from mapweave.maps import Alignment, Submap, lines_of
+from mapweave.maps import Alignment, LineMap, Submap, lines_of
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.parameters import StageParameters, derived
 
@@ -58,6 +60,12 @@ class ComponentMergingParameters(StageParameters):
     gaps: int = Field(
         2, ge=1, description="between two components where it is looked for, the last"
     )
+    comparisons: int = Field(
+        4, ge=1, description="of components, when a submap is finished; others wait for the next"
+    )
+    waiting: int = Field(
+        500, ge=1, description="pairs that may wait; more are asked when one of them has grown"
+    )
     step: float = Field(0.3, gt=0, description="[m] between the places tried there")
     turn_step: float = Field(0.06, gt=0, description="[rad] between the headings tried there")
     place: float = Field(2.0, gt=0, description="[m] within which the middles of submaps are alike")
@@ -71,7 +79,9 @@ class ComponentMerger:
 
     def __init__(self, parameters: ComponentMergingParameters | None = None) -> None:
         self._p = parameters or ComponentMergingParameters()
-        self._compared: dict[tuple[int, int], tuple[float, float]] = {}
+        self._compared: dict[tuple[int, int], tuple[float, float]] = {}  # [m] of wall, then
+        self._walls: dict[int, float] = {}  # [m] in each component, the last time
+        self._due: set[tuple[int, int]] = set()
         self._shapes: dict[int, tuple[object, PreparedMap | None]] = {}
         self._place_recognizer = PlaceRecognizer(self._p.place_recognition, self._p.fusion)
 
@@ -98,14 +108,15 @@ class ComponentMerger:
         """
         joined = list(submaps)
         joints: list[tuple[int, int]] = []
-        for younger in sorted({s.component for s in submaps})[1:]:
-            for older in sorted({s.component for s in joined if s.component < younger}):
-                after = self._joined(joined, older, younger)
-                if after is not None:
-                    of_younger = {s.id for s in joined if s.component == younger}
-                    joints.append(_nearest(after, older, of_younger))
-                    joined = after
-                    break
+        for _ in range(self._p.comparisons):
+            pair = self._next(joined)
+            if pair is None:
+                break
+            after = self._joined(joined, *pair)
+            if after is not None:
+                of_younger = {s.id for s in joined if s.component == pair[1]}
+                joints.append(_nearest(after, pair[0], of_younger))
+                joined = after
         if not joints:
             joined, joints = self._recognised(joined, tracked)
         if joints:
@@ -142,12 +153,36 @@ class ComponentMerger:
             for s in submaps
         ]
 
+    def _next(self, submaps: Sequence[Submap]) -> tuple[int, int] | None:
+        """Return the pair of components, the older first, that is most worth comparing; or none.
+
+        One in which the newest submap is comes before all others, then that with the most wall in
+        both. Only so many are compared at once: the others wait, so that a robot that is lost again
+        and again does not pay for all its pieces with each of them.
+        """
+        newest = submaps[-1].component if submaps else 0
+
+        def worth(pair: tuple[int, int]) -> tuple[bool, float, tuple[int, int]]:
+            return newest in pair, min(self._walls[c] for c in pair), pair
+
+        self._note_growth(_walls(submaps))
+        if len(self._due) > self._p.waiting:
+            self._due = set(nlargest(self._p.waiting, self._due, key=worth))
+        return max(self._due, key=worth, default=None)
+
+    def _note_growth(self, walls: dict[int, float]) -> None:
+        """Note which pairs are due, now that the components have `walls` [m]."""
+        known, self._walls = self._walls, walls
+        enough = {c for c, wall in walls.items() if wall >= self._p.fusion.min_wall}
+        self._due = {pair for pair in self._due if enough.issuperset(pair)}
+        for one in (c for c in enough if walls[c] != known.get(c)):
+            pairs = [(min(one, other), max(one, other)) for other in enough - {one}]
+            self._due.update(pair for pair in pairs if self._is_due(pair))
+
     def _joined(self, submaps: Sequence[Submap], older: int, younger: int) -> list[Submap] | None:
         """Return `submaps` with two components as one, where what both saw proves it."""
-        walls = _wall(submaps, older), _wall(submaps, younger)
-        if not self._is_due((older, younger), walls):
-            return None
-        self._compared[older, younger] = walls
+        self._compared[older, younger] = self._walls[older], self._walls[younger]
+        self._due.remove((older, younger))
         alignment = self._compare(submaps, older, younger)
         if alignment.decision != "accepted":
             return None
@@ -180,13 +215,13 @@ class ComponentMerger:
             self._shapes[component] = now, shape
         return shape
 
-    def _is_due(self, pair: tuple[int, int], walls: tuple[float, float]) -> bool:
-        """Whether either of a pair has notably more wall [m] than when it was compared, or less."""
-        before = self._compared.get(pair)
+    def _is_due(self, pair: tuple[int, int]) -> bool:
+        """Whether either of a pair has notably more wall than when it was compared, or less."""
+        before, grown = self._compared.get(pair), 1 + self._p.growth
         if before is None:
             return True
-        grown = 1 + self._p.growth
-        return any(not b / grown <= w <= grown * b for w, b in zip(walls, before, strict=True))
+        now = (self._walls[c] for c in pair)
+        return any(not b / grown <= w <= grown * b for w, b in zip(now, before, strict=True))
 
 
 def _covering(inside: Sequence[Submap], p: ComponentMergingParameters) -> list[Submap]:
@@ -277,6 +312,15 @@ def _middle_of_walls(submap: Submap) -> tuple[float, float]:
     return x, y
 
 
-def _wall(submaps: Sequence[Submap], component: int) -> float:
-    """[m] of wall in the submaps of a component."""
-    return sum(float(lengths(s.map.segments).sum()) for s in submaps if s.component == component)
+def _walls(submaps: Sequence[Submap]) -> dict[int, float]:
+    """[m] of wall in the submaps of each component."""
+    walls: dict[int, float] = {}
+    for s in submaps:
+        walls[s.component] = walls.get(s.component, 0.0) + _wall(s.map)
+    return walls
+
+
+@lru_cache(1024)
+def _wall(lines: LineMap) -> float:
+    """[m] of wall; lines are the same object as long as they are the same lines."""
+    return float(lengths(lines.segments).sum())

@@ -109,6 +109,7 @@ class Mapper:
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         self._backend = backend or Backend(self.parameters.backend)
+        self._settling = self._growing  # what built the last finished submap
         self._unsettled = False  # whether the last finished submap is being settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
@@ -163,8 +164,8 @@ class Mapper:
 
     def robot_map(self) -> RobotMap:
         """Return the finished submaps and the growing one."""
-        growing = [] if self._growing.is_empty else [self._submap()]
-        submaps = (*self._finished, *growing)
+        growing = [] if self._growing.is_empty else [self._submap(self._growing.line_map())]
+        submaps = (*self._with_walls(self._finished), *growing)
         return RobotMap(self.robot, self.boot, self._version, submaps, self._made_with)
 
     def _numbered(self, scan: Scan) -> Scan:
@@ -229,18 +230,24 @@ class Mapper:
     def _finish_submap(self) -> None:
         """Have the growing submap settled, adopt what became of the one before, start another."""
         self._adopt_settled()
-        submap = self._submap()
+        submap = self._submap(self._growing.outline())
         scans = tuple(self._merged[k] for k in submap.trajectory.scan_index.tolist())
-        self._backend.begin(FinishedSubmap(submap, scans, self._follows, self._spare()))
+        self._backend.begin(
+            FinishedSubmap(submap, scans, self._growing, self._follows, self._spare())
+        )
         self._finished.append(submap)
-        self._unsettled = self._follows = True
+        self._settling, self._unsettled, self._follows = self._growing, True, True
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._merged = {}
         self._version += 1
 
     def _adopt_settled(self) -> None:
         """Move everything to where it settled, the growing submap with the last scan before it."""
-        settled = self._backend.take() if self._unsettled else None
+        if not self._unsettled:
+            return
+        settled = self._backend.take()
+        if settled is None:
+            self._finished = self._with_walls(self._finished)
         self._unsettled = False
         if settled is None:
             return
@@ -261,12 +268,19 @@ class Mapper:
         """
         return self._newest_component + 1
 
-    def _submap(self) -> Submap:
+    def _with_walls(self, submaps: list[Submap]) -> list[Submap]:
+        """Return `submaps`, of the one that is being settled the walls, and not its outline."""
+        if not self._unsettled:
+            return submaps
+        return [*submaps[:-1], replace(submaps[-1], map=self._settling.line_map())]
+
+    def _submap(self, lines: LineMap) -> Submap:
+        """Return the growing submap with its `lines`."""
         return Submap(
             len(self._finished),
             self._component,
             se2.compose(self._origin, self._frame),
-            self._growing.line_map(),
+            lines,
             self._growing.trajectory(),
         )
 

@@ -5,6 +5,7 @@ metres is rigid; where it is found in another component twice in a row, at the s
 is there.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,7 @@ class PlaceRecognitionParameters(StageParameters):
     """What is looked for, and when it is found."""
 
     submaps: int = Field(3, ge=1, description="that are rigid together, some 36 m of path")
+    asked: int = Field(4, ge=1, description="components looked in, the ones of most submaps")
     agreement: PartParameters = derived(PartParameters.of)
 
 
@@ -78,8 +80,10 @@ class PlaceRecognizer:
         part = tracked[-self._p.submaps :]
         here = submaps[-1].component if submaps else 0
         others = sorted({s.component for s in submaps} - {here})
-        long = [c for c in others if self._is_long(submaps, c)]
-        if len(part) < self._p.submaps or not long or not self._is_long(submaps, here):
+        sizes = Counter(s.component for s in submaps)
+        long = [c for c in others if sizes[c] > self._p.submaps]
+        long = sorted(sorted(long, key=lambda c: -sizes[c])[: self._p.asked])
+        if len(part) < self._p.submaps or not long or sizes[here] <= self._p.submaps:
             return None
         newest = prepare(lines_of(part), self._fusion)
         for component in long:
@@ -92,9 +96,6 @@ class PlaceRecognizer:
             if newest and pair in before and self._agree(before[pair], found, newest)
         ]
         return again[0] if len(again) == 1 else None
-
-    def _is_long(self, submaps: Sequence[Submap], component: int) -> bool:
-        return sum(s.component == component for s in submaps) > self._p.submaps
 
     def _found(
         self, part: Sequence[Submap], newest: PreparedMap | None, other: PreparedMap | None

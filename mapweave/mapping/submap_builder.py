@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -9,8 +10,9 @@ from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.segments import lengths
 from mapweave.lines.fitting import FittingParameters
-from mapweave.lines.merging import MergingParameters, count_support, evolving_map
+from mapweave.lines.merging import MergingParameters, count_support, evolve, evolving_map
 from mapweave.lines.polylines import group_polylines
 from mapweave.lines.selection import SelectionParameters
 from mapweave.lines.simplification import SimplificationParameters, simplify, sources
@@ -26,8 +28,9 @@ from mapweave.mapping.change_detection import (
 from mapweave.mapping.tracking.pose_covariance import EXACT
 from mapweave.maps import LineMap, Trajectory
 from mapweave.parameters import StageParameters, derived
-from mapweave.scan.free_space import FreeSpaceParameters, rings, scan_free_space, unite
+from mapweave.scan.free_space import FreeSpaceParameters, rings, seen_free
 from mapweave.scan.scan import Scan
+from mapweave.scan.visibility import sights_of
 
 
 class SubmapParameters(StageParameters):
@@ -85,16 +88,24 @@ class _Standing:
     support: IntArray
 
 
+class _Merged(NamedTuple):
+    """(m, 4) merged segments [m], their (m,) weights, and (n,) in which each sighting is."""
+
+    segments: FloatArray
+    weights: FloatArray
+    labels: IntArray
+
+
 class SubmapBuilder:
     """Takes placed scans and merges them into lines; its frame is that of its first scan."""
 
     def __init__(self, parameters: SubmapParameters) -> None:
         self._parameters = parameters
         self._map = evolving_map(np.empty((0, 4)), np.empty(0), parameters.merging)
+        self._moved: _Merged | None = None  # once its scans were moved, or it was sent
         self._sightings: list[FloatArray] = []  # of each scan, in the submap's frame
-        self._cleared: list[BaseGeometry] = []
-        self._witnesses = no_witnesses(parameters.change_detection)  # the scans that cleared it
-        self._witness_pose: FloatArray | None = None  # of the last
+        self._viewpoints: list[Viewpoint] = []  # where scans cleared space
+        self._witnesses = no_witnesses(parameters.change_detection)  # the same for segments
         self._indices: list[int] = []
         self._stamps: list[float] = []
         self._poses: list[FloatArray] = []
@@ -137,6 +148,62 @@ class SubmapBuilder:
         self._merge(scan.index, se2.transform_segments(pose, segments))
         self._clear(scan, pose)
 
+    def moved_to(self, poses: FloatArray) -> "SubmapBuilder":
+        """Return the same scans at other poses; it takes no more scans.
+
+        What was merged stays merged, moves with what it was merged from, and is merged with what
+        now lies on it. The lines are placed anew in any case, on all that was seen.
+
+        Parameters
+        ----------
+        poses
+            (n, 3) [m, m, rad], in the order of the trajectory.
+        """
+        at = poses[np.argsort(np.argsort(self._indices))]
+        moves = se2.compose(at, se2.inverse(np.array(self._poses).reshape(-1, 3)))
+        moved = SubmapBuilder(self._parameters)
+        moved._moved = self._merged_again(moves)
+        moved._sightings = [
+            _each_moved(np.tile(move, (len(seen), 1)), seen)
+            for move, seen in zip(moves, self._sightings, strict=True)
+        ]
+        moved._indices, moved._stamps = self._indices, self._stamps
+        moved._poses, moved._uncertainties = list(at), self._uncertainties
+        moved._path, moved._turned = self._path, self._turned
+        pose_of = dict(zip(self._indices, at, strict=True))
+        for viewpoint in self._viewpoints:
+            moved._see(replace(viewpoint, pose=pose_of[viewpoint.scan.index]))
+        return moved
+
+    def _merged_again(self, moves: FloatArray) -> _Merged:
+        """Return the merged segments, each moved as its sightings are, by their lengths."""
+        segments, weights, labels = self._merged()
+        move = np.repeat(moves, [len(seen) for seen in self._sightings], axis=0)
+        weight = lengths(np.concatenate([np.empty((0, 4)), *self._sightings]))
+        ends = _each_moved(move, segments[labels]) * weight[:, None]
+        total = np.bincount(labels, weight, minlength=len(segments))
+        sums = [np.bincount(labels, values, minlength=len(segments)) for values in ends.T]
+        placed = np.column_stack(sums) / total[:, None]
+        again = evolve(placed, weights, self._parameters.merging)
+        return _Merged(again.segments, again.weights, again.labels[labels])
+
+    def _merged(self) -> _Merged:
+        if self._moved is not None:
+            return self._moved
+        return _Merged(self._map.segments(), self._map.weights(), self._map.labels())
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what another process needs: it takes no more scans there."""
+        state = {**self.__dict__, "_moved": self._merged()}
+        del state["_map"], state["_witnesses"]  # compiled; the one is spent, the other made anew
+        return state
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self._witnesses = no_witnesses(self._parameters.change_detection)
+        for viewpoint in self._viewpoints:
+            add_witness(self._witnesses, viewpoint, self._parameters.change_detection)
+
     def trajectory(self) -> Trajectory:
         """Return the poses of the scans added, in order of their index."""
         order = np.argsort(self._indices)
@@ -150,12 +217,11 @@ class SubmapBuilder:
     def line_map(self) -> LineMap:
         """Return the lines, simplified, and the free space seen so far."""
         p = self._parameters
-        free = unite(self._cleared, p.free_space)
+        free = self._free_space()
         standing = self._standing()
-        kept = np.flatnonzero(np.isin(standing.owner[self._map.labels()], standing.left))
-        counts = [len(segments) for segments in self._sightings]
+        kept = np.flatnonzero(np.isin(standing.owner[self._merged().labels], standing.left))
         sightings = np.concatenate([np.empty((0, 4)), *self._sightings])[kept]
-        scans = np.repeat(np.array(self._indices, dtype=np.int64), counts)[kept]
+        scans = self._scans()[kept]
         once = np.ones(len(kept), dtype=np.int64)
         walls = simplify(standing.segments[standing.left], sightings, once, free, p.simplification)
         wall, source = sources(walls, sightings, p.simplification)
@@ -163,20 +229,41 @@ class SubmapBuilder:
         lines = self._grouped(walls[found], *self._still_there(walls[found], labels, scans[source]))
         return replace(lines, free_space=rings(free))
 
+    def outline(self) -> LineMap:
+        """Return the lines, not simplified, and the free space: what recognising a place takes."""
+        return replace(self.lines(), free_space=rings(self._free_space()))
+
+    def _free_space(self) -> BaseGeometry:
+        """Return what was seen through so far."""
+        p, places = self._parameters.free_space, self._viewpoints
+        poses = np.array([w.pose for w in places]).reshape(-1, 3)
+        return seen_free(sights_of([w.scan for w in places], poses, p.sight), p)
+
     def lines(self) -> LineMap:
         """Return the lines alone, not simplified: fast enough for every scan."""
         standing = self._standing()
         return self._grouped(standing.segments, standing.left, standing.support)
 
     def _standing(self) -> _Standing:
-        segments = self._map.segments()
+        """Return what was merged, whose slivers are, and what was not seen through since."""
+        segments, _, labels = self._merged()
         owner = owners(segments, self._parameters.slivers)
         whole = np.flatnonzero(owner == np.arange(len(owner)))
-        support, last = self._map.seen(owner)
-        numbers = self._map.numbers()[whole]
-        denied = self._witnesses.count_numbered(numbers, segments[whole], last[whole])
-        left, remaining = not_vanished(support[whole], denied, self._parameters.change_detection)
+        if self._moved is None:
+            support, last = (of_each[whole] for of_each in self._map.seen(owner))
+            numbers = self._map.numbers()[whole]
+            denied = self._witnesses.count_numbered(numbers, segments[whole], last)
+        else:
+            place, scans = np.searchsorted(whole, owner[labels]), self._scans()
+            support, last = count_support(place, scans), last_sightings(place, scans)
+            denied = self._witnesses.count(segments[whole], last)
+        left, remaining = not_vanished(support, denied, self._parameters.change_detection)
         return _Standing(segments, owner, whole[left], remaining)
+
+    def _scans(self) -> IntArray:
+        """(n,) the scan of each sighting."""
+        counts = [len(segments) for segments in self._sightings]
+        return np.repeat(np.array(self._indices, dtype=np.int64), counts)
 
     def _still_there(
         self, segments: FloatArray, labels: IntArray, scans: IntArray
@@ -197,16 +284,27 @@ class SubmapBuilder:
     def _clear(self, scan: Scan, pose: FloatArray) -> None:
         """Note what `scan` saw through, unless a scan from about here did already."""
         p = self._parameters
-        if self._witness_pose is not None:
-            step, turn = _motion(self._witness_pose, pose)
+        if self._viewpoints:
+            step, turn = _motion(self._viewpoints[-1].pose, pose)
             if step < p.free_space_step and turn < p.free_space_turn:
                 return
-        self._cleared.append(scan_free_space(scan, pose, p.free_space))
-        self._witness_pose = pose
-        add_witness(self._witnesses, Viewpoint(scan, pose), p.change_detection)
+        self._see(Viewpoint(scan, pose))
+
+    def _see(self, viewpoint: Viewpoint) -> None:
+        self._viewpoints.append(viewpoint)
+        add_witness(self._witnesses, viewpoint, self._parameters.change_detection)
 
 
 def _motion(start: FloatArray, end: FloatArray) -> tuple[float, float]:
     """Return how far a pose is from another [m], and how much it is turned [rad]."""
     x, y, turn = (end - start).tolist()
     return math.hypot(x, y), abs(math.remainder(turn, 2 * math.pi))
+
+
+def _each_moved(moves: FloatArray, segments: FloatArray) -> FloatArray:
+    """(n, 4) `segments`, each moved by a motion of its own, (n, 3) [m, m, rad]."""
+    x, y, turn = moves.T
+    c, s = np.cos(turn), np.sin(turn)
+    first, second = segments[:, :2].T, segments[:, 2:].T
+    ends = [(c * u - s * v + x, s * u + c * v + y) for u, v in (first, second)]
+    return np.column_stack([*ends[0], *ends[1]])

@@ -9,13 +9,14 @@ parallel walls still propose the right transform (``python -m benchmarks referen
 figures in docs/paper.md). The loop as the paper prints it is `mapweave.fusion.reference`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.lines.directions import likely_turns
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
@@ -25,6 +26,8 @@ from mapweave.matching.verification import VerificationParameters, coarse_scores
 from mapweave.parameters import StageParameters, derived
 from mapweave.shape.corners import CornerParameters, Corners, find_corners, propose
 from mapweave.shape.windows import WindowParameters, Windows, all_windows, match_all
+
+BLOCK = 4096  # proposals that are put in order at once, the best first
 
 
 class HypothesisParameters(StageParameters):
@@ -38,6 +41,9 @@ class HypothesisParameters(StageParameters):
     turn_separation: float = Field(0.17, gt=0, description="[rad] between likely turns: 10°")
     alignment: FieldIcpParameters = FieldIcpParameters()
     proposal_samples: int = Field(60, ge=10, description="of a map's walls, scoring proposals")
+    max_proposals: int = Field(
+        20_000, ge=1, description="scored so; of more, the best by a quarter of the samples"
+    )
     aligned: int = Field(50, ge=2, description="proposals that are aligned, the best")
     start_distance: float = Field(0.4, gt=0, description="[m] between those: what alignment mends")
     start_turn: float = Field(0.09, gt=0, description="[rad] between those: 5°")
@@ -89,6 +95,10 @@ def hypothesise(
     p = parameters
     if proposals is None:
         proposals = _proposals(reference, other, p, verification)
+    if len(proposals) > p.max_proposals:
+        few = p.proposal_samples // 4
+        first = coarse_scores(reference.raster, other.raster, proposals, few, verification)
+        proposals = proposals[np.argpartition(-first, p.max_proposals)[: p.max_proposals]]
     middle = other.raster.oriented.points.mean(axis=0)
     rough = coarse_scores(
         reference.raster, other.raster, proposals, p.proposal_samples, verification
@@ -140,12 +150,34 @@ def _distinct(
     place = transforms[:, :2] + np.column_stack(
         [c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]]
     )
-    left = np.argsort(-scores, kind="stable")
     kept: list[int] = []
-    while len(left) and len(kept) < count:
-        best = int(left[0])
-        kept.append(best)
-        apart = np.hypot(*(place[left] - place[best]).T)
-        turned = np.abs(se2.wrap(transforms[left, 2] - transforms[best, 2]))
-        left = left[(apart > least[0]) | (turned > least[1])]
+    for some in _best_first(scores):
+        left = some
+        for other in kept:
+            left = left[_differs(place, transforms[:, 2], left, other, least)]
+        while len(left) and len(kept) < count:
+            kept.append(int(left[0]))
+            left = left[_differs(place, transforms[:, 2], left, kept[-1], least)]
+        if len(kept) == count:
+            break
     return kept
+
+
+def _best_first(scores: FloatArray) -> Iterator[IntArray]:
+    """Yield indices of the (n,) `scores`, the highest first, a block at a time."""
+    if len(scores) > 2 * BLOCK:
+        limit = np.partition(scores, -BLOCK)[-BLOCK]
+        best, rest = np.flatnonzero(scores >= limit), np.flatnonzero(scores < limit)
+        yield best[np.argsort(-scores[best], kind="stable")]
+        yield rest[np.argsort(-scores[rest], kind="stable")]
+    else:
+        yield np.argsort(-scores, kind="stable")
+
+
+def _differs(
+    place: FloatArray, turn: FloatArray, some: IntArray, other: int, least: tuple[float, float]
+) -> BoolArray:
+    """(n,) which of `some` differ from the `other` one by more than `least` [m], [rad]."""
+    apart = np.hypot(place[some, 0] - place[other, 0], place[some, 1] - place[other, 1])
+    turned = np.abs(se2.wrap(turn[some] - turn[other]))
+    return np.asarray((apart > least[0]) | (turned > least[1]))

@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array
+from mapweave.kernels.scores import look_up_scores
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.parameters import StageParameters, derived
@@ -115,18 +116,20 @@ def _coarse_one_way(
     """One look-up for each sample: in single precision, as the cells are coarser than that."""
     stride = 1 + (len(other.weight) - 1) // max_samples
     weight = other.weight[::stride] * (other.weight.sum() / other.weight[::stride].sum())
-    x, y = (other.oriented.points[::stride].T / reference.cell).astype(np.float32)
-    facing = _directions(other.oriented.normals[::stride]).astype(np.float32)
-    shift = ((transforms[:, :2] - reference.origin) / reference.cell).astype(np.float32)
-    turn = transforms[:, 2, None].astype(np.float32)
-    c, s = np.cos(turn), np.sin(turn)
-    rows, columns = reference.distance.shape
-    i = np.clip(c * x - s * y + shift[:, :1], 0, rows - 1).astype(np.int32)
-    j = np.clip(s * x + c * y + shift[:, 1:], 0, columns - 1).astype(np.int32)
-    said = _codes(reference, p).ravel()[i * columns + j]
-    direction = (facing + turn * np.float32(DIRECTIONS / (2 * np.pi))).astype(np.int32)
-    scores: FloatArray = _worth(p)[said + (direction & (DIRECTIONS - 1))] @ weight
-    return scores
+    points = other.oriented.points[::stride] / reference.cell
+    facing = _directions(other.oriented.normals[::stride])
+    angle = transforms[:, 2].astype(np.float32)
+    shift = (transforms[:, :2] - reference.origin) / reference.cell
+    turn = angle * np.float32(DIRECTIONS / (2 * np.pi))
+    motions = np.column_stack([np.cos(angle), np.sin(angle), shift.astype(np.float32), turn])
+    return look_up_scores(
+        np.column_stack([points, facing]).astype(np.float32),
+        weight,
+        motions,
+        _codes(reference, p),
+        _worth(p),
+        DIRECTIONS,
+    )
 
 
 def _directions(normals: FloatArray) -> FloatArray:
@@ -135,14 +138,14 @@ def _directions(normals: FloatArray) -> FloatArray:
     return np.asarray((turns % 1.0 + 4) * DIRECTIONS)
 
 
-def _codes(raster: DistanceField, p: VerificationParameters) -> IntArray:
+def _codes(raster: DistanceField, p: VerificationParameters) -> Int32Array:
     """(rows, columns) what each cell says: a row of `_worth`, as an offset into it."""
     row = np.where(raster.depth > p.clearance, SEEN_THROUGH, NOTHING)
     near = raster.distance < p.closeness
     facing = _directions(raster.oriented.normals).astype(np.int64) & (DIRECTIONS - 1)
     row[near] = facing[raster.nearest[near]]
     row[[0, -1], :] = row[:, [0, -1]] = NOTHING  # the rim stands for all that lies beyond it
-    return np.asarray(row * DIRECTIONS)
+    return (row * DIRECTIONS).astype(np.int32)
 
 
 def _worth(p: VerificationParameters) -> Float32Array:

@@ -9,14 +9,12 @@ from collections.abc import Iterable
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.geometry import MultiPolygon, Polygon, box
+from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.clearing import Grid, Sights, clear_cells, from_core, outlines
 from mapweave.parameters import StageParameters, derived
-from mapweave.scan.scan import Scan
-from mapweave.scan.visibility import clear_ranges
 
 
 class FreeSpaceParameters(StageParameters):
@@ -30,6 +28,12 @@ class FreeSpaceParameters(StageParameters):
     margin: float = derived(
         lambda c: 0.5 * c.mapping.clearance, ge=0, description="[m] kept from what the beams hit"
     )
+    cell: float = derived(
+        lambda c: 0.5 * c.mapping.resolution,
+        gt=0,
+        description="[m] of the raster in which it is drawn",
+    )
+    max_cells: int = Field(4_000_000, gt=0, description="of the raster; larger ones get coarser")
     simplification: float = Field(
         0.1, gt=0, description="[m] by which outlines may deviate; below the margin"
     )
@@ -37,33 +41,52 @@ class FreeSpaceParameters(StageParameters):
     min_area: float = Field(0.1, ge=0, description="[m²] smaller pieces are not worth sending")
 
 
-def scan_free_space(scan: Scan, pose: FloatArray, parameters: FreeSpaceParameters) -> BaseGeometry:
-    """Return what a scan saw to be free.
+def seen_free(sights: Sights, parameters: FreeSpaceParameters) -> BaseGeometry:
+    """Return what scans saw to be free: polygons in the frame of their poses.
 
-    Parameters
-    ----------
-    scan
-        One sweep.
-    pose
-        (3,) of the sensor [m, m, rad].
-    parameters
-        How far and how surely a scan clears space.
-
-    Returns
-    -------
-    BaseGeometry
-        An area [m] in the frame that `pose` is given in; empty where nothing was cleared.
+    Drawn into a raster, opened there, and outlined: a view through a crack clears nothing that
+    would matter, and costs many vertices.
     """
-    reach = np.maximum(clear_ranges(scan, parameters.sight) - parameters.margin, 0.0)
-    rim = reach[:, None] * np.column_stack([np.cos(scan.angles), np.sin(scan.angles)])
-    fans = [
-        Polygon(np.vstack([np.zeros(2), rim[first:last]]))
-        for first, last in _positive_runs(reach)
-        if last - first >= 2
-    ]
-    sight = shapely.union_all(shapely.make_valid(fans)) if fans else Polygon()
-    placed = shapely.transform(sight, lambda points: se2.transform_points(pose, points))
-    return shapely.simplify(placed, parameters.simplification / 2)
+    p = parameters
+    bounds = _seen_bounds(sights, p.margin)
+    if bounds is None:
+        return MultiPolygon()
+    low, high = bounds
+    cell = max(p.cell, float(np.sqrt(np.prod(high - low) / p.max_cells)))
+    rows, columns = (np.ceil((high - low) / cell).astype(np.int64) + 1).tolist()
+    free = clear_cells(sights, p.margin, Grid(low, cell, rows, columns))
+    depth = max(1, round(p.min_width / 2 / cell + 0.5))  # between a cell's middle and its edge
+    level = max(depth - 1.0, 0.5)  # half a cell inside of where it ends
+    corners, start = outlines(from_core(free, depth), level)
+    found = _with_holes(np.split(low + cell * (corners - 0.5), start[1:-1]) if len(corners) else [])
+    # What was opened has no neck so narrow that thinning its outline would close it.
+    simpler = shapely.simplify(found, p.simplification - cell / 2, preserve_topology=False)
+    whole = shapely.union_all(shapely.make_valid(simpler))
+    return MultiPolygon([q for q in _polygons(whole) if q.area >= p.min_area])
+
+
+def _seen_bounds(sights: Sights, margin: float) -> tuple[FloatArray, FloatArray] | None:
+    """Return the least and the greatest x and y [m] of what was seen through; None of nothing."""
+    reach = np.maximum(sights.clear - margin, 0.0)
+    if not (reach > 0).any():
+        return None
+    x, y, turn = (np.repeat(values, np.diff(sights.start)) for values in sights.poses.T)
+    angle = turn + sights.angles
+    places = x, x + reach * np.cos(angle), y, y + reach * np.sin(angle)
+    low, high = ([ends(values) for values in places] for ends in (np.min, np.max))
+    return np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
+
+
+def _with_holes(outlines: list[FloatArray]) -> list[Polygon]:
+    """Return polygons of rings (k, 2): those that turn right are holes in the least around them."""
+    polygons = [Polygon(ring) for ring in outlines if len(ring) >= 3]
+    outer = sorted((q for q in polygons if q.exterior.is_ccw), key=lambda q: q.area)
+    holes: list[list[FloatArray]] = [[] for _ in outer]
+    for hole in (q.exterior for q in polygons if not q.exterior.is_ccw):
+        around = next((k for k, q in enumerate(outer) if q.contains(hole)), None)
+        if around is not None:
+            holes[around].append(np.array(hole.coords))
+    return [Polygon(q.exterior, inside) for q, inside in zip(outer, holes, strict=True)]
 
 
 def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> BaseGeometry:
@@ -119,12 +142,6 @@ def from_rings(outlines: Iterable[FloatArray]) -> BaseGeometry:
     return shapely.union_all(shapely.make_valid(polygons)) if polygons else Polygon()
 
 
-def _positive_runs(reach: FloatArray) -> list[tuple[int, int]]:
-    """Half-open ranges of consecutive beams that cleared anything."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], reach > 0, [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:
     """The polygons in `geometry`; what has no area, as stray points and lines, is left out."""
     parts = shapely.get_parts(geometry)
@@ -138,6 +155,6 @@ def _without_holes(polygon: Polygon) -> list[Polygon]:
     left, bottom, right, top = polygon.bounds
     hole_left, _, hole_right, _ = polygon.interiors[0].bounds
     middle = (hole_left + hole_right) / 2
-    halves = (box(left, bottom, middle, top), box(middle, bottom, right, top))
-    cut = [part for half in halves for part in _polygons(shapely.intersection(polygon, half))]
+    halves = ((left, bottom, middle, top), (middle, bottom, right, top))
+    cut = [part for half in halves for part in _polygons(shapely.clip_by_rect(polygon, *half))]
     return [piece for part in cut for piece in _without_holes(part)]

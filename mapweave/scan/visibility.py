@@ -1,8 +1,11 @@
 """What a scan saw through: every beam proves the space before its return to be free."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.kernels.clearing import Sights
 from mapweave.scan.scan import Scan
 
 
@@ -68,3 +71,20 @@ def _beams(scan: Scan, bearing: FloatArray) -> tuple[IntArray, BoolArray]:
     beam: IntArray = np.rint(steps).astype(np.int64)
     beam[beam >= count] = 0
     return beam, inside
+
+
+def sights_of(scans: Sequence[Scan], poses: FloatArray, max_range: float) -> Sights:
+    """Return what `scans`, taken at (n, 3) `poses`, saw through, up to `max_range` [m].
+
+    Of each beam as `clear_ranges` tells.
+    """
+    start = np.concatenate([[0], np.cumsum([len(scan.ranges) for scan in scans], dtype=np.int64)])
+    none = np.empty(0)
+    ranges = np.concatenate([none, *(scan.ranges for scan in scans)])
+    reach = np.minimum(np.nan_to_num(ranges, nan=0.0), max_range)
+    before, after = np.roll(reach, 1), np.roll(reach, -1)
+    first, last = start[:-1], start[1:] - 1
+    before[first], after[last] = reach[first], reach[last]
+    clear = np.minimum(np.minimum(before, reach), after)
+    angles = np.concatenate([none, *(scan.angles for scan in scans)])
+    return Sights(angles, clear, start, np.ascontiguousarray(poses, dtype=np.float64))

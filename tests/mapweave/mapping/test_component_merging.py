@@ -125,6 +125,30 @@ def test_a_pair_that_was_refused_is_compared_again_when_a_part_of_one_has_left_i
         assert len(compared) == count
 
 
+def test_however_many_components_there_are_few_are_compared_at_once_and_all_in_the_end(
+    rng: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot that is lost again and again does not pay for each piece with every scan."""
+    compared: list[str] = []
+
+    def refuse(*names: object) -> Alignment:
+        compared.append(str(names[0]))
+        return Alignment("older", "younger", np.zeros(3), "refused", 0.0, Reason.words("so"))
+
+    monkeypatch.setattr("mapweave.mapping.component_merging.compare", refuse)
+    monkeypatch.setattr("mapweave.mapping.component_merging._between_them", lambda *_: np.empty(0))
+    lines = part(OTHER_BUILDING, 0, 26)
+    pieces = [submap(k, k, random_pose(rng), lines) for k in range(8)]
+    component_merging = ComponentMerger()
+    counts = []
+    for _ in range(8):
+        compared.clear()
+        component_merging.reunite(pieces)
+        counts.append(len(compared))
+    most = ComponentMergingParameters().comparisons
+    assert max(counts) == most and sum(counts) == 8 * 7 // 2 and counts[-1] == 0
+
+
 def broken(parts: list[LineMap], gap: FloatArray) -> list[Submap]:
     """Return two submaps of one corridor; at the end of the first, track was lost.
 

@@ -23,6 +23,7 @@ from tests.mapweave.buildings import (
     OTHER_BUILDING,
     cast,
     scans_along,
+    tour,
     walls_of,
 )
 
@@ -221,6 +222,22 @@ def test_a_map_can_be_taken_while_it_grows_and_its_version_grows_with_it(rng: Ge
         versions.append(so_far.version)
     assert (so_far.robot, so_far.boot) == ("a", "second")
     assert (np.diff(versions) > 0).all()
+
+
+def test_what_is_published_of_a_submap_that_is_being_settled_are_its_walls(
+    rng: Generator,
+) -> None:
+    """Places are recognised by an outline, which draws a wall as often as merging left it."""
+    mapper = Mapper("a")
+    for k, pose in enumerate(tour([(1, 1), (16, 1)], 0.4)):
+        placement = mapper.add(cast(walls_of(BUILDING), pose, index=k, noise=rng))
+        if placement.submap_finished:
+            break
+    finished, *_ = mapper.robot_map().submaps
+    settled, *_ = mapper.finish().submaps
+    assert finished.trajectory.scan_index.tolist() == settled.trajectory.scan_index.tolist()
+    assert abs(len(finished.map.segments) - len(settled.map.segments)) <= 2
+    assert finished.map.free_space
 
 
 class JoinsAll:

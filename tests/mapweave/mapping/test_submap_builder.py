@@ -89,3 +89,37 @@ def test_looking_at_the_map_does_not_change_it(rng: Generator) -> None:
     np.testing.assert_array_equal(first.segments, second.segments)
     assert len(first.free_space) == len(second.free_space)
     np.testing.assert_array_equal(first.free_space[0], second.free_space[0])
+
+
+def test_where_all_scans_move_alike_all_that_they_saw_moves_with_them(rng: Generator) -> None:
+    submap, move = grown(PLACES, rng), np.array([3.0, -2.0, 0.7])
+    poses = se2.compose(move, submap.trajectory().pose)
+    moved = submap.moved_to(poses)
+    np.testing.assert_allclose(moved.trajectory().pose, poses, atol=1e-12)
+    expected = se2.transform_segments(move, submap.lines().segments)
+    np.testing.assert_allclose(moved.lines().segments, expected, atol=1e-9)
+    before, after = (from_rings(each.line_map().free_space) for each in (submap, moved))
+    assert after.area == pytest.approx(before.area, rel=0.02)
+    assert (submap.trajectory().pose == grown(PLACES, rng).trajectory().pose).all()  # as it was
+
+
+def test_scans_that_are_put_right_draw_each_wall_once(rng: Generator) -> None:
+    """Merged apart, as they were tracked, and drawn where they belong in the end."""
+    true = se2.between(PLACES[0], PLACES)
+    off = true + np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [-0.1, 0, 0], [0, -0.1, 0]])
+    submap = SubmapBuilder(SubmapParameters())
+    for k, place in enumerate(PLACES):
+        scan = cast(walls_of(CORNERS), place, index=k, angles=AROUND, noise=rng)
+        submap.add(scan, extract_segments(scan).segments, off[k])
+    walls = in_the_room(submap.moved_to(true).line_map())
+    long = walls[np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > 1]
+    assert len(long) == 4
+    assert np.abs(long[:, None] - walls_of(CORNERS)).max(axis=-1).min(axis=1).max() < 0.15
+
+
+def test_the_outline_has_the_walls_and_the_free_space_not_simplified(rng: Generator) -> None:
+    submap = grown(PLACES, rng)
+    outline, lines = submap.outline(), submap.line_map()
+    np.testing.assert_array_equal(outline.segments, submap.lines().segments)
+    for ring, same in zip(outline.free_space, lines.free_space, strict=True):
+        np.testing.assert_array_equal(ring, same)

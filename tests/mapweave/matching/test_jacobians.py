@@ -11,10 +11,10 @@ import pytest
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.kernels.multiview import STAYS, normal_equations
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.field_icp import FieldIcpParameters, align_on_raster
 from mapweave.matching.icp import IcpParameters, Target, align, partners
-from mapweave.matching.multiview_icp import STAYS, _derivatives, _Pairs
 from mapweave.scan.points import OrientedPoints, points_on_lines
 from tests.mapweave.buildings import BUILDING, line_map, part, random_pose, walls_of
 
@@ -97,32 +97,38 @@ def test_one_step_by_look_up_is_a_gauss_newton_step(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_derivatives_between_two_scans_are_those_of_the_residuals_by_both_poses(
-    seed: int,
-) -> None:
-    """The partner and its surface move with the scan that they are of, unless they stay."""
+def test_normal_equations_of_many_scans_are_those_of_the_differences(seed: int) -> None:
+    """Each point has its nearest as its partner, in another scan or in what stays."""
     rng = np.random.default_rng(seed)
-    count, scans = 40, 4
-    poses = np.array([random_pose(rng, 5.0) for _ in range(scans)])
-    scan, other = rng.integers(0, scans, count), rng.integers(STAYS, scans, count)
-    local, partner = rng.normal(0, 4, (2, count, 2))
-    angle = rng.uniform(-np.pi, np.pi, count)
-    normal = np.column_stack([np.cos(angle), np.sin(angle)])
-    with_fixed = np.vstack([poses, se2.IDENTITY])  # STAYS is the last one
+    scans, each = 3, 8
+    owner = np.repeat(np.arange(scans), each)
+    points, angle = rng.uniform(-3, 3, (scans * each, 2)), rng.uniform(-np.pi, np.pi, scans * each)
+    normals = np.column_stack([np.cos(angle), np.sin(angle)])
+    walls, faces = rng.uniform(-3, 3, (9, 2)), np.tile([0.6, 0.8], (9, 1))
+    poses = rng.normal(0, 0.3, (scans, 3))
 
-    def placed(flat: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        moved = np.vstack([flat.reshape(-1, 3), se2.IDENTITY])
-        there = [se2.transform_points(moved[s], p) for s, p in zip(scan, local, strict=True)]
-        mate = [se2.transform_points(moved[o], q) for o, q in zip(other, partner, strict=True)]
-        faces = [se2.rotation(moved[o, 2]) @ n for o, n in zip(other, normal, strict=True)]
-        return np.array(there), np.array(mate), np.array(faces)
+    def placed(flat: FloatArray) -> tuple[FloatArray, FloatArray]:
+        at = flat.reshape(-1, 3)[owner]
+        there = [se2.transform_points(pose, p) for pose, p in zip(at, points, strict=True)]
+        turned = [se2.rotation(pose[2]) @ n for pose, n in zip(at, normals, strict=True)]
+        return np.vstack([*there, walls]), np.vstack([*turned, faces])
+
+    everything = np.hstack(placed(poses.ravel())) * [1, 1, 0.4, 0.4]
+    apart = np.linalg.norm(everything[: len(points), None] - everything, axis=-1)
+    np.fill_diagonal(apart, np.inf)
+    nearest = apart.argmin(axis=1)
+    whose = np.append(owner, np.full(len(walls), STAYS))
+    pairs = np.flatnonzero(whose[nearest] != owner)
+    assert len(pairs) > scans
 
     def residuals(flat: FloatArray) -> FloatArray:
-        there, mate, faces = placed(flat)
-        return np.asarray(((there - mate) * faces).sum(axis=1))
+        there, turned = placed(flat)
+        partner = nearest[pairs]
+        return np.asarray(((there[pairs] - there[partner]) * turned[partner]).sum(axis=1))
 
-    there, _, faces = placed(with_fixed[:scans].ravel())
-    pairs = _Pairs(scan, other, faces, there, residuals(poses.ravel()), np.ones(count))
-    jacobian = _derivatives(pairs, scan, poses) - _derivatives(pairs, other, poses)
-    expected = differences(residuals, poses.ravel())
-    np.testing.assert_allclose(jacobian.toarray(), expected, atol=1e-6)
+    jacobian = differences(residuals, poses.ravel())
+    matrix, pull = normal_equations(
+        points, normals, owner, poses, walls, faces, 0.4, partners=1, scale=FAR
+    )
+    np.testing.assert_allclose(matrix, jacobian.T @ jacobian, atol=1e-5)
+    np.testing.assert_allclose(pull, jacobian.T @ residuals(poses.ravel()), atol=1e-5)

@@ -5,11 +5,13 @@ import pytest
 import shapely
 from numpy.random import Generator
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, scan_free_space, unite
+from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, seen_free, unite
 from mapweave.scan.scan import Scan
+from mapweave.scan.visibility import sights_of
 from tests.mapweave.buildings import (
     AROUND,
     BUILDING,
@@ -25,13 +27,15 @@ CORNERS = rectangle(0, 0, 6, 4)
 ROOM = walls_of(CORNERS)
 
 
+def free_of(scan: Scan, pose: FloatArray) -> BaseGeometry:
+    """What one scan saw to be free."""
+    return seen_free(sights_of([scan], pose[None], P.sight), P)
+
+
 def test_a_room_seen_from_several_places_is_free_up_to_the_margin() -> None:
     places = [[1, 1, 0], [5, 1, 2], [5, 3, -2], [1, 3, 1], [3, 2, 0]]
-    pieces = [
-        scan_free_space(cast(ROOM, pose, angles=AROUND), np.array(pose, dtype=float), P)
-        for pose in places
-    ]
-    free = unite(pieces, P)
+    scans = [cast(ROOM, pose, angles=AROUND) for pose in places]
+    free = seen_free(sights_of(scans, np.array(places, dtype=float), P.sight), P)
     room = Polygon(CORNERS)
     assert room.buffer(-P.margin + P.simplification).covers(free)  # never nearer to a wall
     shrunk = room.buffer(-2.5 * P.margin)
@@ -42,14 +46,14 @@ def test_nothing_outside_a_building_is_ever_free(rng: Generator) -> None:
     inside = Polygon(BUILDING)
     for x in rng.uniform(0.5, 29.5, 15):
         pose = np.array([x, rng.uniform(0.4, 1.8), rng.uniform(-np.pi, np.pi)])
-        free = scan_free_space(cast(walls_of(BUILDING), pose, noise=rng), pose, P)
+        free = free_of(cast(walls_of(BUILDING), pose, noise=rng), pose)
         assert free.area > 1
         assert shapely.difference(free, inside).area == pytest.approx(0, abs=1e-3)
 
 
 def test_free_space_ends_where_sight_ends() -> None:
     hall = walls_of(rectangle(-50, -50, 50, 50))
-    free = scan_free_space(cast(hall, [0, 0, 0], angles=AROUND, max_range=200), np.zeros(3), P)
+    free = free_of(cast(hall, [0, 0, 0], angles=AROUND, max_range=200), np.zeros(3))
     corners = shapely.get_coordinates(free)
     assert np.hypot(*corners.T).max() <= P.sight
     assert free.area == pytest.approx(np.pi * (P.sight - P.margin) ** 2, rel=0.02)
@@ -60,8 +64,8 @@ def test_beams_that_did_not_come_back_leave_a_gap() -> None:
     scan = cast(ROOM, [1, 2, 0])
     ranges = scan.ranges.copy()
     ranges[85:95] = np.nan
-    whole = scan_free_space(scan, np.zeros(3), P)
-    free = scan_free_space(Scan(ranges, scan.angles, 0, 0.0), np.zeros(3), P)
+    whole = free_of(scan, np.zeros(3))
+    free = free_of(Scan(ranges, scan.angles, 0, 0.0), np.zeros(3))
     wedge = np.radians([-4.9, 3.9])
     for bearing in wedge:
         assert whole.contains(shapely.Point(3 * np.cos(bearing), 3 * np.sin(bearing)))
@@ -72,13 +76,13 @@ def test_beams_that_did_not_come_back_leave_a_gap() -> None:
 
 def test_a_blind_scan_frees_nothing() -> None:
     blind = Scan(np.full(len(FRONT), np.nan), FRONT, 0, 0.0)
-    assert scan_free_space(blind, np.zeros(3), P).is_empty
+    assert free_of(blind, np.zeros(3)).is_empty
 
 
 def test_free_space_moves_with_the_sensor(rng: Generator) -> None:
     pose, scan = random_pose(rng), cast(ROOM, [2, 1, 0.3])
-    here = scan_free_space(scan, np.zeros(3), P)
-    there = scan_free_space(scan, pose, P)
+    here = free_of(scan, np.zeros(3))
+    there = free_of(scan, pose)
     back = shapely.transform(there, lambda p: se2.transform_points(se2.inverse(pose), p))
     # The outline may be thinned at other corners, by half the tolerance each.
     assert back.hausdorff_distance(here) < P.simplification
@@ -114,7 +118,7 @@ def test_a_doubled_end_beam_of_a_full_turn_changes_no_free_space() -> None:
     """The fan of a full turn closes on itself."""
     angles = np.linspace(-np.pi, np.pi, 361)
     ranges = 3 + np.cos(angles)
-    doubled = scan_free_space(Scan(ranges, angles), np.zeros(3), P)
-    single = scan_free_space(Scan(ranges[:-1], angles[:-1]), np.zeros(3), P)
+    doubled = free_of(Scan(ranges, angles), np.zeros(3))
+    single = free_of(Scan(ranges[:-1], angles[:-1]), np.zeros(3))
     assert doubled.area == pytest.approx(single.area, rel=0.01)
     assert doubled.area == pytest.approx(np.pi * (2.85**2 + 0.5), rel=0.02)
