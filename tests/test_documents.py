@@ -180,7 +180,7 @@ def _is_module(name: str) -> bool:
 
 
 def _packages() -> Iterator[Path]:
-    for package in PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
+    for package in PROJECT["tool"]["scikit-build"]["wheel"]["packages"]:
         yield ROOT / package
     yield ROOT / "benchmarks"
 

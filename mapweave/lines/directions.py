@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry.arguments import as_segments, as_values
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
-from mapweave.kernels import main_directions as kernel
-from mapweave.kernels.main_directions import LINE_PERIOD, DirectionRules, line_difference
+from mapweave.kernels.lines import main_directions as kernel
+from mapweave.kernels.lines.main_directions import LINE_PERIOD, DirectionRules, line_difference
 
 DIRECTED_PERIOD = 2 * np.pi
 

@@ -1,9 +1,9 @@
 """Discrete Segment Evolution: many sightings of a surface become one segment (paper, VI).
 
 Always the cheapest pair is merged next, until none is cheap enough;
-`mapweave.lines.merging_rules` has the rules, `mapweave.kernels.merging` the steps. Each segment
-weighs the total length observed, not its own length as in the paper, so that a well-known wall
-stays where it is.
+`mapweave.lines.merging_rules` has the rules, `mapweave.kernels.lines.merging` the steps. Each
+segment weighs the total length observed, not its own length as in the paper, so that a well-known
+wall stays where it is.
 
 Neither step sees polylines. The paper hands corresponding polylines to both; here any two segments
 are a pair that are near, show the same face and are cheap, and polylines are made of the result.
@@ -15,7 +15,7 @@ import numpy as np
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.segments import lengths
-from mapweave.kernels.merging import EvolvingMap
+from mapweave.kernels.lines.merging import EvolvingMap
 from mapweave.lines.merging_rules import MergingParameters
 
 __all__ = [

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.errors import ArgumentError
 from mapweave.geometry.arguments import as_numbers, as_segments, as_values
 from mapweave.geometry.arrays import ComplexArray, FloatArray
-from mapweave.kernels.merging_cost import (
+from mapweave.kernels.lines.merging_cost import (
     CostTerms,
     Pairs,
     collinearity,

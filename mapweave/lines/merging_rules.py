@@ -11,7 +11,7 @@ What the paper leaves open, and what we chose:
 import numpy as np
 from pydantic import Field
 
-from mapweave.kernels.merging_rules import MergingRules
+from mapweave.kernels.lines.merging_rules import MergingRules
 from mapweave.lines.directions import DirectionParameters
 from mapweave.lines.merging_cost import CostWeights
 from mapweave.parameters import StageParameters, derived

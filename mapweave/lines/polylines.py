@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from mapweave.geometry.arguments import as_positive, as_segments
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.kernels import polylines as kernel
+from mapweave.kernels.lines import polylines as kernel
 
 MAX_GAP = 0.5  # [m] within a polyline: half of a door
 

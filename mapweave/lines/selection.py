@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
-from mapweave.kernels.evidence import take_greedily
+from mapweave.kernels.lines.evidence import take_greedily
 from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.parameters import StageParameters, derived
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.segments import sample
-from mapweave.kernels.evidence import gather, near_pairs
+from mapweave.kernels.lines.evidence import gather, near_pairs
 
 DIRECTION_BINS = 24  # of a full turn: sightings 15° apart are gathered
 

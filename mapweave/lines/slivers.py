@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.kernels.slivers import sliver_owners
+from mapweave.kernels.lines.slivers import sliver_owners
 from mapweave.lines.merging import Evolution
 from mapweave.parameters import StageParameters, derived
 

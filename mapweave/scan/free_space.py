@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import FloatArray
@@ -155,6 +155,7 @@ def _without_holes(polygon: Polygon) -> list[Polygon]:
     left, bottom, right, top = polygon.bounds
     hole_left, _, hole_right, _ = polygon.interiors[0].bounds
     middle = (hole_left + hole_right) / 2
-    halves = ((left, bottom, middle, top), (middle, bottom, right, top))
-    cut = [part for half in halves for part in _polygons(shapely.clip_by_rect(polygon, *half))]
+    # Not clip_by_rect, which is faster: it leaves pieces that touch themselves.
+    halves = (box(left, bottom, middle, top), box(middle, bottom, right, top))
+    cut = [part for half in halves for part in _polygons(shapely.intersection(polygon, half))]
     return [piece for part in cut for piece in _without_holes(part)]

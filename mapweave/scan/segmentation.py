@@ -79,6 +79,7 @@ def extract_segments(scan: Scan, parameters: SegmentationParameters | None = Non
 
     Examples
     --------
+    >>> import numpy as np
     >>> angles = np.linspace(-0.5, 0.5, 60)
     >>> wall = Scan(2 / np.cos(angles), angles)  # 2 m ahead, seen from the origin
     >>> extract_segments(wall).segments.round(2)

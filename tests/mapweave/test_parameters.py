@@ -48,7 +48,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "DistanceFieldParameters": {"cell": 0.1, "spacing": 0.2},
     "FftCorrelationParameters": {"clearance": 0.5},
     "FittingParameters": {"tolerance": 0.09, "max_hole": 0.3},
-    "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15},
+    "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15, "cell": 0.05},
     "FusionParameters": {},
     "HypothesisParameters": {},
     "IcpParameters": {"end_scale": 0.04, "noise": 0.1},
@@ -57,6 +57,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "JointParameters": {"max_gap": 0.5},
     "KidnapDetectionParameters": {"closeness": 0.25, "clearance": 0.3, "sight": 12.0},
     "LocalMapParameters": {
+        "thin": 0.02,
         "keyframe_step": 0.3,
         "keyframe_turn": 0.26,
         "overlap": 0.15,

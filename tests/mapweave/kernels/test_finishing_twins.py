@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapweave.kernels import clearing, evidence, multiview, polygons, scores
+from mapweave.kernels import clearing, multiview, polygons, scores
 from mapweave.kernels.clearing import Grid, Sights
+from mapweave.kernels.lines import evidence
 from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.point_map import Floats
 

@@ -10,11 +10,11 @@ from numpy.random import Generator
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.kernels.denials import NumpyWitnesses
+from mapweave.kernels.lines.main_directions import numpy_main_directions
+from mapweave.kernels.lines.merging import NumpyEvolvingMap
+from mapweave.kernels.lines.polylines import numpy_group_polylines
+from mapweave.kernels.lines.slivers import numpy_sliver_owners
 from mapweave.kernels.loading import COMPILED
-from mapweave.kernels.main_directions import numpy_main_directions
-from mapweave.kernels.merging import NumpyEvolvingMap
-from mapweave.kernels.polylines import numpy_group_polylines
-from mapweave.kernels.slivers import numpy_sliver_owners
 from mapweave.lines.merging import MergingParameters
 from mapweave.lines.merging_cost import CostWeights
 

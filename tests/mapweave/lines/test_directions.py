@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.kernels.main_directions import DirectionRules, _significant_peaks
+from mapweave.kernels.lines.main_directions import DirectionRules, _significant_peaks
 from mapweave.lines.directions import (
     DIRECTED_PERIOD,
     LINE_PERIOD,

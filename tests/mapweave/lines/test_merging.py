@@ -9,8 +9,8 @@ import pytest
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.io.readers import read_reference_poses, read_scans
-from mapweave.kernels.merging_cost import Pairs
-from mapweave.kernels.merging_rules import Pairing
+from mapweave.kernels.lines.merging_cost import Pairs
+from mapweave.kernels.lines.merging_rules import Pairing
 from mapweave.lines.merging import Evolution, MergingParameters, count_support, evolve, merge_scan
 from mapweave.lines.merging_cost import merge_cost
 from mapweave.lines.slivers import absorb_slivers

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mapweave.kernels.arrays import BoolArray, FloatArray, IntArray
+from mapweave.kernels.lines.merging_cost import Pairs
+from mapweave.kernels.lines.merging_rules import MergingRules, Pairing
 from mapweave.kernels.loading import COMPILED
-from mapweave.kernels.merging_cost import Pairs
-from mapweave.kernels.merging_rules import MergingRules, Pairing
 
 NO_SCAN = -1
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapweave.kernels.arrays import ComplexArray, FloatArray
-from mapweave.kernels.main_directions import (
+from mapweave.kernels.lines.main_directions import (
     DirectionRules,
     nearest_direction,
     numpy_main_directions,
 )
-from mapweave.kernels.merging_cost import Pairs, cost_terms, merged_segments
+from mapweave.kernels.lines.merging_cost import Pairs, cost_terms, merged_segments
 
 
 @dataclass(frozen=True, slots=True)

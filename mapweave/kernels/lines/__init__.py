@@ -1,0 +1,1 @@
+"""What merging and simplifying lines takes (paper, VI and VII)."""
