@@ -15,8 +15,8 @@ from pathlib import Path, PurePosixPath
 def package_roots(root: Path) -> list[str]:
     """Return the folders of the checkout at `root` that modules are imported from."""
     content = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
-    roots: list[str] = content["tool"]["hatch"]["build"]["dev-mode-dirs"]
-    return roots
+    packages = content["tool"]["scikit-build"]["wheel"]["packages"]
+    return [".", *sorted({str(PurePosixPath(package).parent) for package in packages} - {"."})]
 
 
 def module_name(file: str, roots: Collection[str]) -> str:
