@@ -29,7 +29,9 @@ class EvolvingMap {
     }
     tree_.rebuild(left_);
   }
-  EvolvingMap(const EvolvingMap&) = delete;
+  EvolvingMap(const EvolvingMap& other)
+      : rules_(other.rules_), segments_(other.segments_), parent_(other.parent_), scans_(other.scans_),
+        left_(other.left_), sightings_(other.sightings_), tree_(other.tree_, segments_), queue_(other.queue_) {}
   EvolvingMap& operator=(const EvolvingMap&) = delete;
 
   // G_t from G_(t-1) and the aligned S_t: pair creation, then simplification (VI).
@@ -243,5 +245,6 @@ inline void bind_merging(nb::module_& m) {
       .def("weights", &EvolvingMap::weights)
       .def("numbers", &EvolvingMap::numbers)
       .def("labels", &EvolvingMap::labels)
-      .def("seen", &EvolvingMap::seen, nb::arg("owner"));
+      .def("seen", &EvolvingMap::seen, nb::arg("owner"))
+      .def("__deepcopy__", [](const EvolvingMap& self, nb::dict) { return self; }, nb::arg("memo"));
 }

@@ -475,5 +475,6 @@ inline void bind_point_map(nb::module_& m) {
       .def("seen_through", &PointMap::seen_through, nb::arg("clear"), nb::arg("first"), nb::arg("spacing"),
            nb::arg("poses"), nb::arg("clearance"), nb::arg("sight"), nb::arg("far_sight"), nb::arg("facing"),
            nb::arg("every") = 1)
-      .def("copy", &PointMap::copy);
+      .def("copy", &PointMap::copy)
+      .def("__deepcopy__", [](const PointMap& self, nb::dict) { return self; }, nb::arg("memo"));
 }

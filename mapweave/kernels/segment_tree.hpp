@@ -27,6 +27,9 @@ struct Partner {
 class SegmentTree {
  public:
   explicit SegmentTree(const std::vector<Segment>& segments) : segments_(segments) { rebuild({}); }
+  // The same tree over a copy of its segments.
+  SegmentTree(const SegmentTree& other, const std::vector<Segment>& segments)
+      : segments_(segments), nodes_(other.nodes_), leaf_(other.leaf_), built_(other.built_), added_(other.added_) {}
 
   int64_t size() const { return nodes_[0].count; }
 

@@ -110,5 +110,6 @@ inline void bind_viewpoints(nb::module_& m) {
       .def("add", &Viewpoints::add, nb::arg("clear"), nb::arg("first"), nb::arg("spacing"), nb::arg("pose"))
       .def("free", &Viewpoints::free, nb::arg("points"), nb::arg("poses"), nb::arg("asked"), nb::arg("nearest"),
            nb::arg("clearance"))
-      .def("copy", &Viewpoints::copy);
+      .def("copy", &Viewpoints::copy)
+      .def("__deepcopy__", [](const Viewpoints& self, nb::dict) { return self; }, nb::arg("memo"));
 }

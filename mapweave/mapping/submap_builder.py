@@ -1,5 +1,6 @@
 """A submap while it grows: G_t from G_(t-1) and S_t (paper, V and VI)."""
 
+import copy
 import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -191,6 +192,12 @@ class SubmapBuilder:
         if self._moved is not None:
             return self._moved
         return _Merged(self._map.segments(), self._map.weights(), self._map.labels())
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "SubmapBuilder":
+        """Return one that goes on by itself; it is not sent, so it still takes scans."""
+        other = object.__new__(SubmapBuilder)
+        other.__dict__ = copy.deepcopy(self.__dict__, memo)
+        return other
 
     def __getstate__(self) -> dict[str, object]:
         """Return what another process needs: it takes no more scans there."""

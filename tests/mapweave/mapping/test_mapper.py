@@ -1,5 +1,6 @@
 """The mapper follows a robot from its scans alone, notices when it is lost, and finds it again."""
 
+import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -366,3 +367,20 @@ def test_a_real_building_is_followed_as_the_issue_asks(data_dir: Path) -> None:
     share, right = real(data_dir / "fr079.log.gz")
     assert share >= 0.95
     assert right >= 0.97
+
+
+def test_a_copied_mapper_goes_on_by_itself() -> None:
+    """As an experiment does that asks what would happen if the robot were carried off here."""
+    scans, _ = scans_along(BUILDING, [(3, 1), (9, 1), (9, 3)], 20)
+    half = len(scans) // 2
+    whole, stopped = Mapper("a"), Mapper("a")
+    for scan in scans[:half]:
+        whole.add(scan)
+        stopped.add(scan)
+    copied = copy.deepcopy(stopped)
+    for scan in scans[half:]:
+        whole.add(scan)
+        copied.add(scan)
+    expected, found = whole.finish().lines(0).segments, copied.finish().lines(0).segments
+    np.testing.assert_array_equal(found, expected)
+    assert len(stopped.finish().lines(0).segments) < len(expected)
