@@ -5,13 +5,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.mutation_entries import Mutation
 from mapweave.kernels.loading import PURE
 from tests.conftest import DATA
+from tools.imports import package_roots
 
 ROOT = Path(__file__).parents[1]
 MADE = {"bench", "demo", "team", "site", "dist"}  # folders at the root that are no code
@@ -37,14 +37,11 @@ class Tree:
         shutil.copytree(ROOT, folder, ignore=_left_out)
         (folder / FIRST).mkdir()
         (folder / FIRST / "sitecustomize.py").write_text(FORGET_THE_INSTALLED)
-        with (folder / "pyproject.toml").open("rb") as file:
-            packages = tomllib.load(file)["tool"]["scikit-build"]["wheel"]["packages"]
-        roots = dict.fromkeys([FIRST, *(Path(package).parent for package in packages)])
         self._environment = {
             "MAPWEAVE_DATA": str(DATA),
             **os.environ,
             # Before what is installed; without byte code, which may look as new as a changed file.
-            "PYTHONPATH": os.pathsep.join(str(folder / root) for root in roots),
+            "PYTHONPATH": os.pathsep.join(str(folder / root) for root in [FIRST, *package_roots(folder)]),
             "PYTHONDONTWRITEBYTECODE": "1",
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",

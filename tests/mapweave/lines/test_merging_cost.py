@@ -85,7 +85,7 @@ def test_two_segments_evolve_into_one_exactly_where_the_cost_in_the_paper_allows
     start = random.normal(0, 0.3, (2, 2))
     along = random.uniform(0.3, 3.0, (2, 1)) * np.column_stack([np.cos(turn), np.sin(turn)])
     pair = np.hstack([start, start + along])
-    cost = plain_cost(*pair, None)
+    cost = plain_cost(pair[0], pair[1], None)
     for limit, left in ((0.99 * cost, 2), (1.01 * cost, 1)):
         open_to_all = MergingParameters(
             max_cost=limit, max_step=1e3, max_gap=1e3, direction_tolerance=0.0
