@@ -1,4 +1,4 @@
-"""What `mutations.toml` holds: single lines of the code made wrong, and the tests that notice."""
+"""What `mutations.toml` holds: single rules of the code made wrong, and the tests that notice."""
 
 import tomllib
 from collections.abc import Sequence
@@ -22,8 +22,40 @@ Room = Literal[
 ]
 
 
-class Mutation(BaseModel):
-    """One place in the code, made wrong.
+class Place(BaseModel):
+    """Where code is made wrong, and how.
+
+    Attributes
+    ----------
+    file
+        Of the code, from the root of the tree.
+    before, after
+        The text as it is, found once in the file, and what replaces it.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    file: str
+    before: str = Field(min_length=1)
+    after: str
+
+    def replace_in(self, text: str, name: str) -> str:
+        """Return the `text` of the file made wrong, by the mutation `name`.
+
+        Raises
+        ------
+        FileError
+            If the place is not there, or more than once.
+        """
+        found = text.count(self.before)
+        if found != 1:
+            place = f"mutation {name}: expected {self.before!r} once"
+            raise FileError(Path(self.file), f"{place}, found it {found} times")
+        return text.replace(self.before, self.after)
+
+
+class Mutation(Place):
+    """One rule in the code, made wrong.
 
     Attributes
     ----------
@@ -33,40 +65,40 @@ class Mutation(BaseModel):
         What part of the program it is of.
     survived
         Whether it is one of those that no test noticed once; none of these may survive again.
-    file
-        Of the code, from the root of the tree.
-    before, after
-        The text as it is, found once in the file, and what replaces it.
+    file, before, after
+        The place; of a rule with a kernel, in the NumPy twin.
+    kernel
+        The same rule in the compiled kernel, and what follows of it there, such as bounds.
     guards
         Files of tests, or single tests as pytest names them, from the root of the tree.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
     room: Room
     survived: bool = False
-    file: str
-    before: str = Field(min_length=1)
-    after: str
+    kernel: tuple[Place, ...] = ()
     guards: tuple[str, ...] = Field(min_length=1)
 
-    def apply(self, tree: Path) -> str:
-        """Make the code in `tree` wrong; return the text of the file as it was.
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """All that is made wrong."""
+        return (self, *self.kernel)
+
+    def apply(self, tree: Path) -> dict[str, str]:
+        """Make the code in `tree` wrong; return the texts of the files as they were.
 
         Raises
         ------
         FileError
-            If the text is not there, or more than once.
+            If a place is not there, or more than once; no file is changed then.
         """
-        path = tree / self.file
-        text = path.read_text()
-        found = text.count(self.before)
-        if found != 1:
-            place = f"mutation {self.name}: expected {self.before!r} once"
-            raise FileError(path, f"{place}, found it {found} times")
-        path.write_text(text.replace(self.before, self.after))
-        return text
+        right = {place.file: (tree / place.file).read_text() for place in self.places}
+        wrong = right.copy()
+        for place in self.places:
+            wrong[place.file] = place.replace_in(wrong[place.file], self.name)
+        for file, text in wrong.items():
+            (tree / file).write_text(text)
+        return right
 
 
 def read_entries(path: Path = ENTRIES) -> tuple[Mutation, ...]:

@@ -192,6 +192,22 @@ def test_a_merged_wall_follows_the_main_direction_near_it() -> None:
     )  # 0.03 when it follows its parts
 
 
+@pytest.mark.parametrize("degrees", [10, 100, 190, 280])
+def test_a_merged_wall_shows_the_side_that_its_parts_do(degrees: float) -> None:
+    """Whichever way its main direction, that of a line, is taken to run."""
+    ahead = np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))])
+    parts = np.array([np.concatenate([k * ahead, (k + 3) * ahead]) for k in (0, 2)])
+    np.testing.assert_allclose(evolve(parts).segments, [[0, 0, *5 * ahead]], atol=1e-9)
+
+
+def test_ends_within_the_noise_are_one_end_and_farther_ones_are_not() -> None:
+    """Averaged by weight, which is 3 to 1; the hull has the outer ones."""
+    parameters = MergingParameters(end_noise=0.1)
+    parts = np.array([[0.0, 0, 3, 0], [0.08, 0, 3.4, 0]])
+    merged = evolve(parts, np.array([3.0, 1.0]), parameters).segments
+    np.testing.assert_allclose(merged, [[0.02, 0, 3.4, 0]], atol=1e-9)
+
+
 def test_an_oblique_wall_stays_oblique_though_a_main_direction_is_near() -> None:
     straight = np.array([[0, y, 5, y] for y in range(2, 12)], dtype=float)
     angle = np.deg2rad(3)

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from mapweave.errors import ArgumentError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import ComplexArray, FloatArray
+from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.merging_cost import (
     CostWeights,
     Pairs,
@@ -74,6 +75,22 @@ def test_the_cost_is_that_of_the_construction_in_the_paper(direction: float | No
     first, second = some_segments(1)
     expected = [plain_cost(a, b, direction) for a, b in zip(first, second, strict=True)]
     np.testing.assert_allclose(merge_cost(first, second, direction), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_two_segments_evolve_into_one_exactly_where_the_cost_in_the_paper_allows(seed: int) -> None:
+    """Up to 55° from each other and of any lengths; neither gaps nor steps keep them apart."""
+    random = np.random.default_rng(seed)
+    turn = random.uniform(-3, 3) + np.array([0.0, random.uniform(-0.96, 0.96)])
+    start = random.normal(0, 0.3, (2, 2))
+    along = random.uniform(0.3, 3.0, (2, 1)) * np.column_stack([np.cos(turn), np.sin(turn)])
+    pair = np.hstack([start, start + along])
+    cost = plain_cost(pair[0], pair[1], None)
+    for limit, left in ((0.99 * cost, 2), (1.01 * cost, 1)):
+        open_to_all = MergingParameters(
+            max_cost=limit, max_step=1e3, max_gap=1e3, direction_tolerance=0.0
+        )
+        assert len(evolve(pair, None, open_to_all).segments) == left
 
 
 def test_parallelism_is_length_times_tangent() -> None:
