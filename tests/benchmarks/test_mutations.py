@@ -151,6 +151,7 @@ def test_what_the_tests_notice_is_told_apart_and_the_copy_is_right_again(
 @pytest.mark.skipif(
     not all(map(shutil.which, ("cmake", "ninja", "c++"))), reason="nothing here to compile with"
 )
+@pytest.mark.slow
 def test_the_twin_and_the_kernel_are_made_wrong_and_tested_each(tree: Tree) -> None:
     """A rule is kept in one of the two, and the tests say in which they noticed."""
     (entry,) = chosen(ENTRIES, ["turn-noise-ignored"])
