@@ -41,7 +41,9 @@ class Tree:
             "MAPWEAVE_DATA": str(DATA),
             **os.environ,
             # Before what is installed; without byte code, which may look as new as a changed file.
-            "PYTHONPATH": os.pathsep.join(str(folder / root) for root in [FIRST, *package_roots(folder)]),
+            "PYTHONPATH": os.pathsep.join(
+                str(folder / root) for root in [FIRST, *package_roots(folder)]
+            ),
             "PYTHONDONTWRITEBYTECODE": "1",
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",
