@@ -69,7 +69,9 @@ def test_a_rule_of_a_twin_is_made_wrong_in_its_kernel_too(mutation: Mutation) ->
     """And is guarded in its room: that the two compute the same says nothing of the rule."""
     has_kernel = mutation.file.startswith("mapweave/kernels/")
     assert bool(mutation.kernel) == has_kernel
-    assert all(re.fullmatch(r"mapweave/kernels/[\w/]+\.hpp", place.file) for place in mutation.kernel)
+    assert all(
+        re.fullmatch(r"mapweave/kernels/[\w/]+\.hpp", place.file) for place in mutation.kernel
+    )
     assert not any(guard.startswith("tests/mapweave/kernels/") for guard in mutation.guards)
 
 
