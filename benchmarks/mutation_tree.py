@@ -42,7 +42,7 @@ class Tree:
             **os.environ,
             # Before what is installed; without byte code, which may look as new as a changed file.
             "PYTHONPATH": os.pathsep.join(
-                str(folder / root) for root in [FIRST, *package_roots(folder)]
+                str(folder / root) for root in [str(FIRST), *package_roots(folder)]
             ),
             "PYTHONDONTWRITEBYTECODE": "1",
             "OMP_NUM_THREADS": "1",
