@@ -142,5 +142,5 @@ inline void bind_denials(nb::module_& m) {
       .def("add", &Witnesses::add, nb::arg("scan"), nb::arg("clear"), nb::arg("first"), nb::arg("step"), nb::arg("pose"))
       .def("count", &Witnesses::count, nb::arg("segments"), nb::arg("last_seen"))
       .def("count_numbered", &Witnesses::count_numbered, nb::arg("numbers"), nb::arg("segments"), nb::arg("last_seen"))
-      .def("__deepcopy__", [](const Witnesses& self, nb::dict) { return self; }, nb::arg("memo"));
+      .def("__deepcopy__", [](const Witnesses& self, nb::handle) { return self; }, nb::arg("memo"));
 }

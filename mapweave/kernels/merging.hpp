@@ -246,5 +246,5 @@ inline void bind_merging(nb::module_& m) {
       .def("numbers", &EvolvingMap::numbers)
       .def("labels", &EvolvingMap::labels)
       .def("seen", &EvolvingMap::seen, nb::arg("owner"))
-      .def("__deepcopy__", [](const EvolvingMap& self, nb::dict) { return self; }, nb::arg("memo"));
+      .def("__deepcopy__", [](const EvolvingMap& self, nb::handle) { return self; }, nb::arg("memo"));
 }

@@ -476,5 +476,5 @@ inline void bind_point_map(nb::module_& m) {
            nb::arg("poses"), nb::arg("clearance"), nb::arg("sight"), nb::arg("far_sight"), nb::arg("facing"),
            nb::arg("every") = 1)
       .def("copy", &PointMap::copy)
-      .def("__deepcopy__", [](const PointMap& self, nb::dict) { return self; }, nb::arg("memo"));
+      .def("__deepcopy__", [](const PointMap& self, nb::handle) { return self; }, nb::arg("memo"));
 }

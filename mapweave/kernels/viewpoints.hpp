@@ -111,5 +111,5 @@ inline void bind_viewpoints(nb::module_& m) {
       .def("free", &Viewpoints::free, nb::arg("points"), nb::arg("poses"), nb::arg("asked"), nb::arg("nearest"),
            nb::arg("clearance"))
       .def("copy", &Viewpoints::copy)
-      .def("__deepcopy__", [](const Viewpoints& self, nb::dict) { return self; }, nb::arg("memo"));
+      .def("__deepcopy__", [](const Viewpoints& self, nb::handle) { return self; }, nb::arg("memo"));
 }
