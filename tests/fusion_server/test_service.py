@@ -116,13 +116,13 @@ def test_hostile_messages_are_dropped_and_told_of(
     server = start_server()
     watcher = network.watcher()
     mallory = network.connect()
-    robot = f"mapweave/@v1/{network.team}/agent/m"
+    robot = f"mapweave/v2/{network.team}/agent/m"
     someone = encode(MapMessage.pack(make_map("a")))
     for payload in (b"", b"\xc1", b"\xdd\xff\xff\xff\xff", someone[:-7], someone):
-        for key in (f"{robot}/map", f"{robot}/alignment/m/a", "mapweave/@v1/{team}/agent/M !/map"):
+        for key in (f"{robot}/map", f"{robot}/alignment/m/a", "mapweave/v2/{team}/agent/M !/map"):
             mallory.put(key.format(team=network.team), payload)
     with (
-        mallory.liveliness().declare_token(f"mapweave/@v1/{network.team}/@live/M !/x"),
+        mallory.liveliness().declare_token(f"mapweave/v2/{network.team}/live/agent/M !/x"),
         network.robot("a") as a,
     ):
         a.publish_map(make_map("a"))

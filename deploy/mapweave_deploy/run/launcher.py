@@ -21,12 +21,12 @@ from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.keys import everything
 from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 
 ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
 ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things
 POLL = 0.2  # [s] after which a dead process or the end is noticed
-EVERYTHING = "mapweave/@v1/{team}/**"
 CAPACITY = 100_000  # messages waiting to be counted
 
 _log = logging.getLogger(__name__)
@@ -134,7 +134,7 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
     recorder, inbox = Recorder(), Inbox(CAPACITY)
     with (
         open_session([plan.listen], patience=ROUTER_PATIENCE) as session,
-        session.declare_subscriber(EVERYTHING.format(team=plan.team), inbox.put),
+        session.declare_subscriber(everything(plan.team), inbox.put),
     ):
         start_server(crew, plan, plan.store)
         for member in plan.members:

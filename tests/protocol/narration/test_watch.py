@@ -124,7 +124,11 @@ def test_a_join_that_a_version_does_not_rely_on_is_told_once_with_the_reason() -
 
 def test_what_is_no_message_is_not_told() -> None:
     watcher = Watcher()
-    for key in (keys.MAP.build(team="t", robot="a"), "mapweave/@v1/t/@live/NO ID/1", "elsewhere"):
+    for key in (
+        keys.MAP.build(team="t", robot="a"),
+        "mapweave/v2/t/live/agent/NO ID/1",
+        "elsewhere",
+    ):
         assert list(watcher.tell(Arrival(key, b"junk"))) == []
 
 
