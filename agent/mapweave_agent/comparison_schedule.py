@@ -149,6 +149,12 @@ class ComparisonSchedule:
         return {name: peer.published for name, peer in peers if peer.published is not None}
 
     @property
+    def held(self) -> tuple[MapVersion, ...]:
+        """Which state of each peer's map is here."""
+        newest = (self._peers[name].newest for name in sorted(self._peers))
+        return tuple(MapVersion.of(robot_map) for robot_map in newest if robot_map is not None)
+
+    @property
     def idle(self) -> bool:
         """Whether nothing is left for us to compare, unless something new arrives."""
         return not any(self._ours(name) for name in self._peers)

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -17,8 +16,8 @@ from mapweave.team.joint_optimization import JointOptimizer
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
 from mapweave.team.revocation import mark_revoked
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
+from mapweave_protocol.wire.pairs import Run, is_older, states_of
 
-Run: TypeAlias = tuple[str, str]  # robot and boot
 REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
 
 
@@ -105,6 +104,21 @@ class Coordinator:
         """Whether something that matters is in no draft yet."""
         return self._urgency > Urgency.NONE
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether something was received that is in no version yet."""
+        return self.has_news or self._draft is not None
+
+    @property
+    def maps_held(self) -> tuple[MapVersion, ...]:
+        """Which state of each robot's map is here."""
+        return tuple(MapVersion.of(self._maps[robot]) for robot in sorted(self._maps))
+
+    @property
+    def alignments_held(self) -> tuple[tuple[MapVersion, MapVersion], ...]:
+        """Of which states of the maps the alignments of each pair are that are here."""
+        return tuple((held.reference, held.other) for held in self._alignments.values())
+
     def map_of(self, robot: str) -> RobotMap | None:
         """Return a robot's last map, None when there is none."""
         return self._maps.get(robot)
@@ -143,10 +157,10 @@ class Coordinator:
         run it is about is over.
         """
         pair = pair_of(new)
-        if not self.admits(pair) or not self._runs_over.isdisjoint(_sources(new)):
+        if not self.admits(pair) or not self._runs_over.isdisjoint(states_of(_ends(new))):
             return False
         known = self._alignments.get(pair)
-        if known is not None and _is_older(new, known):
+        if known is not None and is_older(_ends(new), _ends(known)):
             return False
         self._alignments[pair] = new
         if known is not None and new.alignments == known.alignments:
@@ -192,7 +206,7 @@ class Coordinator:
             for component in robot_map.components
         }
         for message in self._alignments.values():
-            if runs.issuperset(_sources(message)):
+            if runs.issuperset(states_of(_ends(message))):
                 changes = {k.robot: self._change(k) for k in (message.reference, message.other)}
                 for alignment in message.unpack():
                     if {alignment.reference, alignment.other} <= existing:
@@ -221,18 +235,8 @@ def pair_of(message: AlignmentMessage) -> frozenset[str]:
     return frozenset({message.reference.robot, message.other.robot})
 
 
-def _is_older(new: AlignmentMessage, known: AlignmentMessage) -> bool:
-    """Whether `new` was computed from maps of the same runs of which none is newer, one older."""
-    now, before = _sources(new), _sources(known)
-    if now.keys() != before.keys():
-        return False
-    steps = [now[run] - before[run] for run in now]
-    return max(steps) <= 0 and min(steps) < 0
-
-
-def _sources(message: AlignmentMessage) -> dict[Run, int]:
-    """Return the version of the map of each run that was compared."""
-    return {_run(source): source.version for source in (message.reference, message.other)}
+def _ends(message: AlignmentMessage) -> tuple[MapVersion, MapVersion]:
+    return message.reference, message.other
 
 
 def _run(source: RobotMap | MapVersion) -> Run:

@@ -15,11 +15,23 @@ from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler, MapSender
-from mapweave_protocol.link.inbox import Arrival, alignment_reader, map_reader
+from mapweave_protocol.link.inbox import (
+    Arrival,
+    alignment_reader,
+    map_reader,
+    read_coordinator,
+    status_reader,
+)
+from mapweave_protocol.link.lacking import Lacking
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.keys import LIVE
-from mapweave_protocol.wire.messages import AlignmentMessage, JointMapMessage, MapMessage
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    JointMapMessage,
+    MapMessage,
+    StatusMessage,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -56,6 +68,9 @@ class Intake:
         self._story = story
         self._maps = map_reader()
         self._alignments = alignment_reader()
+        self._statuses = status_reader()
+        self._heard: dict[str, StatusMessage] = {}
+        self._lacking = Lacking()
         self._assembler = MapAssembler()
         self._packers: defaultdict[str, MapSender] = defaultdict(MapSender)
         self._too_large: set[str] = set()
@@ -64,7 +79,7 @@ class Intake:
     @property
     def refused(self) -> int:
         """How many messages were dropped because they were not what they should be."""
-        return self._maps.refused + self._alignments.refused
+        return self._maps.refused + self._alignments.refused + self._statuses.refused
 
     def restore(self) -> None:
         """Take up what the store remembers; what the last version was made of is no news.
@@ -96,8 +111,26 @@ class Intake:
             message = self._alignments.read(arrival)
             if message is not None and self._hears(pair_of(message)):
                 self._take_alignments(message, arrival.payload, received)
+        elif self._statuses.reads(arrival):
+            status = self._statuses.read(arrival)
+            if status is not None and self._hears({status.robot}):
+                self._heard[status.robot] = status
+        elif (coordinator := read_coordinator(arrival)) is not None:
+            boot, here = coordinator
+            record(self._story.coordinator(boot, here=here))
         elif LIVE.matches(arrival.key):
             self._take_presence(arrival)
+
+    def robots_to_ask(self, now: float) -> list[str]:
+        """Return those whose map, by what they have said, has not arrived; `now` [s], any clock."""
+        heard, self._heard = self._heard, {}
+        return [robot for robot, status in heard.items() if self._lacks_map(status, now)]
+
+    def _lacks_map(self, status: StatusMessage, now: float) -> bool:
+        held = self._coordinator.map_of(status.robot)
+        state = (held.boot, held.version) if held is not None else None
+        newer = held is None or held.boot != status.boot or held.version < status.map_version
+        return self._lacking.due(status.robot, state, now, lacks=newer and status.submaps > 0)
 
     def _take_map(self, message: MapMessage, received: float) -> None:
         new = self._assembler.update(message)

@@ -252,8 +252,9 @@ def start_server(endpoint: str, team: str, tmp_path: Path) -> Iterator[StartServ
     """Return what starts a server of the team on its store, and waits until it serves."""
     with ExitStack() as stack:
 
-        def start(*, interval: float = 0.0) -> ServerProcess:
-            server = ServerProcess(endpoint, team, tmp_path / "store.sqlite", interval)
+        def start(*, interval: float = 0.0, store: Path | None = None) -> ServerProcess:
+            file = store or tmp_path / "store.sqlite"
+            server = ServerProcess(endpoint, team, file, interval)
             stack.callback(server.stop, signal.SIGKILL)
             server.wait_for_log(f"coordinating team {team}")
             return server

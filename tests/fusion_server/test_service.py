@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import zenoh
 
 import mapweave_protocol
 from mapweave_protocol.link.asking import ask_joint_maps, ask_robot_map
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire import keys
-from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.messages import MapMessage
+from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.messages import (
+    JointStatusMessage,
+    MapMessage,
+    MapVersion,
+    StatusMessage,
+)
 from mapweave_protocol.wire.queries import JointQuery
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from tests.fusion_server.conftest import (
         Found,
         MakeAlignments,
@@ -132,3 +141,46 @@ def test_hostile_messages_are_dropped_and_told_of(
     assert server.stop() == 0
     assert "messages were not valid and dropped" in server.log
     assert "Traceback" not in server.log
+
+
+def test_a_map_that_did_not_come_is_asked_for(
+    network: Network, start_server: StartServer, make_map: MakeMap
+) -> None:
+    start_server()
+    watcher, silent = network.watcher(), network.connect()
+    parts = {"team": network.team, "robot": "a"}
+    robot_map = make_map("a")
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply(keys.MAP.build(**parts), encode(MapMessage.pack(robot_map)))
+
+    counts = dict.fromkeys(("scans_seen", "scans_placed", "components", "submaps"), 1)
+    fields = {"robot": "a", "boot": robot_map.boot, "stamp": 0.0, "state": "finished"}
+    status = StatusMessage.model_validate({**counts, **fields, "map_version": robot_map.version})
+    with silent.declare_queryable(keys.AGENT_QUERY.build(**parts), answer):
+        for _ in range(6):
+            silent.put(keys.STATUS.build(**parts), encode(status))
+            time.sleep(0.5)
+        assert network.groups(watcher.next()) == [["a/0"]]
+
+
+def test_two_coordinators_of_a_team_say_so_both(start_server: StartServer, tmp_path: Path) -> None:
+    servers = [start_server(), start_server(store=tmp_path / "other.sqlite")]
+    for server in servers:
+        server.wait_for_log("2 coordinators of the team are here")
+
+
+@pytest.mark.usefixtures("finished_team")
+def test_a_coordinator_says_what_it_holds(network: Network, found: Found) -> None:
+    heard: list[bytes] = []
+    key = keys.JOINT_STATUS.build(team=network.team)
+    with network.connect().declare_subscriber(key, lambda s: heard.append(s.payload.to_bytes())):
+        deadline = time.monotonic() + network.patience
+        while not heard and time.monotonic() < deadline:
+            time.sleep(0.05)
+    status = decode(JointStatusMessage, heard[0])
+    assert (status.version, status.pending) == (3, False)
+    map_a, map_b, alignments = found
+    assert status.maps == (MapVersion.of(map_a), MapVersion.of(map_b))
+    assert status.alignments == ((alignments.reference, alignments.other),)

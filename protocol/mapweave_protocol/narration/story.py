@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from mapweave.maps import JointMap, RobotMap, component_name
+from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.narration.story_alignments import AlignmentStory
 from mapweave_protocol.narration.story_joint import JointStory
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
@@ -15,8 +16,8 @@ class RobotState:
 
     Attributes
     ----------
-    boot
-        Of the run that is alive, None if none is.
+    claimants
+        The runs of it that are alive: one, where nothing is wrong.
     map
         Its last map.
     told
@@ -25,11 +26,16 @@ class RobotState:
         The names of all components that the run of `map` has had.
     """
 
-    boot: str | None = None
+    claimants: Claimants = field(default_factory=Claimants)
     status: StatusMessage | None = None
     map: RobotMap | None = None
     told: int = 0
     parts: set[str] = field(default_factory=set)
+
+    @property
+    def here(self) -> bool:
+        """Whether a run of it is alive."""
+        return bool(self.claimants.boots)
 
     @property
     def progress(self) -> str:
@@ -57,6 +63,7 @@ class Story:
         self.robots: dict[str, RobotState] = {}
         self._alignments = AlignmentStory()
         self._joint = JointStory()
+        self._coordinators = Claimants()
 
     @property
     def joint(self) -> JointMap | None:
@@ -64,18 +71,28 @@ class Story:
         return self._joint.joint
 
     def appeared(self, robot: str, boot: str) -> Iterator[str]:
-        """Tell that a run of a robot began."""
+        """Tell that a run of a robot began, and if it is not the only one."""
         state = self._robot(robot)
-        if state.boot != boot:
-            state.boot = boot
+        before = state.here
+        count = state.claimants.take(boot, here=True)
+        if count:
+            yield tell_robots(robot, count)
+        elif not before:
             yield f"{robot} is here"
 
     def left(self, robot: str, boot: str) -> Iterator[str]:
         """Tell that a run of a robot ended."""
         state = self._robot(robot)
-        if state.boot == boot:
-            state.boot = None
+        before = state.here
+        state.claimants.take(boot, here=False)
+        if before and not state.here:
             yield f"{robot} is gone"
+
+    def coordinator(self, boot: str, *, here: bool) -> Iterator[str]:
+        """Tell when a team has more than one coordinator."""
+        count = self._coordinators.take(boot, here=here)
+        if count:
+            yield tell_coordinators(count)
 
     def status(self, message: StatusMessage) -> Iterator[str]:
         """Tell when a robot has finished mapping."""

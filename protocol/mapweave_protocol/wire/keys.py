@@ -78,6 +78,9 @@ STATUS = KeyFormat("mapweave/v2/{team}/agent/{robot}/status")
 ALIGNMENT = KeyFormat("mapweave/v2/{team}/agent/{robot}/alignment/{reference}/{other}")
 JOINT_MAP = KeyFormat("mapweave/v2/{team}/joint/map")
 JOINT_QUERY = KeyFormat("mapweave/v2/{team}/joint/query")
+JOINT_STATUS = KeyFormat("mapweave/v2/{team}/joint/status")
+AGENT_QUERY = KeyFormat("mapweave/v2/{team}/agent/{robot}/query")
+COORDINATOR_LIVE = KeyFormat("mapweave/v2/{team}/live/coordinator/{boot}")
 LIVE = KeyFormat("mapweave/v2/{team}/live/agent/{robot}/{boot}")
 
 
@@ -93,5 +96,5 @@ def everything(team: str) -> str:
 
 
 def new_boot() -> str:
-    """Return a fresh name for this run of a robot."""
+    """Return a fresh name for this run of a robot, or this start of a coordinator."""
     return secrets.token_hex(6)

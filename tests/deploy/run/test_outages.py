@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import mapweave_protocol
 from mapweave.maps import RobotMap
 from mapweave_deploy.run.launcher import (
     Plan,
@@ -84,3 +85,18 @@ def test_the_last_map_of_a_parked_robot_arrives_after_the_outage_it_was_publishe
         until(lambda: says(tmp_path, "agent-r1", "finished: 60 of 60 scans placed"))
         start_router(crew, plan)
         until(lambda: scans_held(plan, "r1") == SCANS)
+
+
+def test_a_coordinator_that_lost_everything_gets_it_back_from_robots_that_have_finished(
+    tmp_path: Path, plan: Plan
+) -> None:
+    with ProcessGroup(tmp_path) as crew:
+        start_router(crew, plan)
+        start_server(crew, plan, plan.store)
+        start_agent(crew, plan, plan.members[0])
+        until(lambda: says(tmp_path, "agent-r1", "finished: 60 of 60 scans placed"))
+        end(crew, child(crew, "server"))
+        start_server(crew, plan, tmp_path / "empty.sqlite")
+        until(lambda: scans_held(plan, "r1") == SCANS)
+        joint = next(mapweave_protocol.joint_maps(plan.team, connect=[plan.listen]))
+    assert [sorted(component.robots) for component in joint.components] == [["r1/0"]]

@@ -7,7 +7,10 @@ from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.keys import KeyFormat
 from mapweave_protocol.wire.pairs import ordered, responsible
 
-FORMATS = [keys.MAP, keys.STATUS, keys.ALIGNMENT, keys.JOINT_MAP, keys.JOINT_QUERY, keys.LIVE]
+FORMATS = [
+    keys.MAP, keys.STATUS, keys.ALIGNMENT, keys.AGENT_QUERY, keys.JOINT_MAP, keys.JOINT_STATUS,
+    keys.JOINT_QUERY, keys.LIVE, keys.COORDINATOR_LIVE,
+]  # fmt: skip
 EXAMPLE = {"team": "rescue", "robot": "r1", "reference": "r1", "other": "r2", "boot": "0af3"}
 
 
