@@ -32,6 +32,7 @@ def store(empty: Store) -> Store:
         ("since=1", [b"version 2", b"version 3"]),
         ("since=0", [b"version 1", b"version 2", b"version 3"]),
         ("since=3", []),
+        ("since=0;limit=2", [b"version 1", b"version 2"]),
         ("robot=a", [b"map of a"]),
     ],
 )

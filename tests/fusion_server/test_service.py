@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,17 +13,22 @@ import pytest
 import zenoh
 
 import mapweave_protocol
+from mapweave.maps import JointMap
+from mapweave_fusion_server.store import Store
 from mapweave_protocol.link.asking import ask_joint_maps, ask_robot_map
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.messages import (
+    JointMapMessage,
     JointStatusMessage,
     MapMessage,
     MapVersion,
     StatusMessage,
 )
 from mapweave_protocol.wire.queries import JointQuery
+
+HISTORY = 300  # versions: more than wait at a subscriber
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -184,3 +191,26 @@ def test_a_coordinator_says_what_it_holds(network: Network, found: Found) -> Non
     map_a, map_b, alignments = found
     assert status.maps == (MapVersion.of(map_a), MapVersion.of(map_b))
     assert status.alignments == ((alignments.reference, alignments.other),)
+
+
+def test_who_listened_before_a_coordinator_with_a_long_history_gets_the_latest_then_the_next(
+    network: Network, start_server: StartServer, make_map: MakeMap, tmp_path: Path
+) -> None:
+    with Store(tmp_path / "store.sqlite", network.team) as store:
+        for version in range(1, HISTORY + 1):
+            message = JointMapMessage.pack(JointMap(version, (), ()), store.series)
+            store.add_version(version, 0.0, encode(message))
+    with ThreadPoolExecutor() as pool:
+        heard = pool.submit(_versions, network, 2)
+        time.sleep(1.0)  # it listens, most likely; if not, it gets the same
+        start_server()
+        with network.robot("a") as a:
+            a.publish_map(make_map("a"))
+            assert heard.result(network.patience) == [HISTORY, HISTORY + 1]
+
+
+def _versions(network: Network, count: int) -> list[int]:
+    joints = mapweave_protocol.joint_maps(
+        network.team, connect=[network.endpoint], timeout=network.patience
+    )
+    return [joint.version for joint in islice(joints, count)]

@@ -31,6 +31,21 @@ def ask_joint_maps(
     return sorted(answers, key=lambda message: message.version)
 
 
+def ask_latest(
+    session: zenoh.Session, team: str, timeout: float = ANSWER_WITHIN
+) -> tuple[JointMapMessage | None, bool]:
+    """Return the latest joint map, None if there is none, and whether a coordinator answered.
+
+    Raises
+    ------
+    MessageError
+        If an answer is not valid.
+    """
+    replies = list(session.get(JOINT_QUERY.build(team=team), timeout=timeout))
+    maps = [decode(JointMapMessage, reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
+    return max(maps, key=lambda message: message.version, default=None), bool(replies)
+
+
 def ask_robot_map(
     session: zenoh.Session, team: str, robot: str, timeout: float = ANSWER_WITHIN
 ) -> MapMessage | None:
