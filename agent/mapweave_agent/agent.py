@@ -16,6 +16,7 @@ from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
+from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
@@ -54,6 +55,12 @@ class Agent:
         Compares maps; it stays the caller's.
     total
         How many scans there will be, where known.
+    state
+        Where this run's map is kept.
+    past
+        The robot's earlier runs that belong to the team's map, the earliest first.
+    first
+        The number of this run's first component, above those of all runs before it.
     """
 
     def __init__(
@@ -64,6 +71,9 @@ class Agent:
         comparer: ComparisonWorker,
         total: int | None,
         parameters: AgentParameters,
+        state: StateFolder,
+        past: Sequence[PastRun] = (),
+        first: int = 0,
     ) -> None:
         self._session = session
         self._team = team
@@ -71,8 +81,13 @@ class Agent:
         self._comparer = comparer
         self._total = total
         self._parameters = parameters
+        self._state = state
+        self._past = {run.state: run for run in past}
+        self._first = first
         self._publication = PublicationSchedule(parameters.map_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
+        if past:
+            self._comparisons.earlier_map(past[-1].map)
         self._needs = Needs(mapper.robot)
         self._reception = Dispatcher(mapper.robot, mapper.boot, self._comparisons, self._needs)
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
@@ -154,9 +169,11 @@ class Agent:
     def _supply(self, now: float) -> None:
         """Send again what others lack, and answer who has asked."""
         own = MapVersion.of(self._published) if self._published.submaps else None
-        missing = self._needs.missing(own, self._outbox.found, now)
+        missing = self._needs.missing(own, self._outbox.found, now, self._past)
         if missing.map:
             self._outbox.send_map(self._published, complete=True)
+        for run in missing.past:
+            self._outbox.send_past(self._past[run])
         for message in missing.alignments:
             self._outbox.send_alignments(message)
         self._outbox.answer(self._published)
@@ -193,8 +210,10 @@ class Agent:
         return found
 
     def _publish_map(self, *, complete: bool) -> None:
-        self._published = without_strays(self._mapper.robot_map())
+        mapped = without_strays(self._mapper.robot_map())
+        self._published = numbered_from(mapped, self._first)
         self._outbox.send_map(self._published, complete=complete)
+        self._state.keep(self._published)
         self._comparisons.own_map(self._published, finished=self._finished)
         self._publication.published(time.monotonic())
         self._changed = False

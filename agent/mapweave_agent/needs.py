@@ -13,14 +13,15 @@ from mapweave_protocol.wire.messages import (
     MapVersion,
     StatusMessage,
 )
-from mapweave_protocol.wire.pairs import is_older
+from mapweave_protocol.wire.pairs import is_older, states_of
 
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """What is to be sent again: the whole map, and alignments."""
+    """What is to be sent again: the whole map, those of past runs, and alignments."""
 
     map: bool = False
+    past: tuple[MapVersion, ...] = ()
     alignments: tuple[AlignmentMessage, ...] = ()
 
 
@@ -48,7 +49,11 @@ class Needs:
         self._peers[status.boot] = status
 
     def missing(
-        self, own: MapVersion | None, found: Iterable[AlignmentMessage], now: float
+        self,
+        own: MapVersion | None,
+        found: Iterable[AlignmentMessage],
+        now: float,
+        past: Iterable[MapVersion] = (),
     ) -> Missing:
         """Return what those lack who have spoken since the last time.
 
@@ -60,15 +65,23 @@ class Needs:
             What this robot has published of each pair, the last of each.
         now
             [s] by any clock.
+        past
+            The maps of this robot's earlier runs, which coordinators should hold.
         """
-        held = {f"coordinator {b}": s.maps for b, s in self._coordinators.items()}
-        held |= {f"{s.robot} {b}": s.holds for b, s in self._peers.items()}
+        coordinators = {f"coordinator {b}": s.maps for b, s in self._coordinators.items()}
+        held = coordinators | {f"{s.robot} {b}": s.holds for b, s in self._peers.items()}
         # All are asked, so that each one's time runs.
         lacks = [own is not None and self._lacks_map(who, m, own, now) for who, m in held.items()]
         missing = tuple(message for message in found if self._lacks_alignments(message, now))
+        wanted = [
+            run
+            for run in past
+            for who, m in coordinators.items()
+            if self._lacks_map(f"{who} {run.boot}", m, run, now)
+        ]
         self._coordinators.clear()
         self._peers.clear()
-        return Missing(any(lacks), missing)
+        return Missing(any(lacks), tuple(dict.fromkeys(wanted)), missing)
 
     def _lacks_map(self, who: str, held: Sequence[MapVersion], own: MapVersion, now: float) -> bool:
         mine = [version for version in held if version.robot == self._robot]
@@ -78,7 +91,7 @@ class Needs:
 
     def _lacks_alignments(self, message: AlignmentMessage, now: float) -> bool:
         ours = message.reference, message.other
-        pair = "/".join(end.robot for end in ours)
+        pair = " ".join(f"{end.robot}@{end.boot}" for end in ours)
         due = False
         for boot, status in self._coordinators.items():
             held = _held_of_pair(status, ours)
@@ -90,6 +103,5 @@ class Needs:
 def _held_of_pair(
     status: JointStatusMessage, ours: tuple[MapVersion, MapVersion]
 ) -> tuple[MapVersion, MapVersion] | None:
-    pair = {end.robot for end in ours}
-    held = (ends for ends in status.alignments if {end.robot for end in ends} == pair)
-    return next(held, None)
+    runs = states_of(ours).keys()
+    return next((ends for ends in status.alignments if states_of(ends).keys() == runs), None)

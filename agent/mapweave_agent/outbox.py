@@ -10,6 +10,7 @@ import zenoh
 import zenoh.ext as ze
 
 from mapweave.maps import RobotMap
+from mapweave_agent.past_runs import PastRun
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import (
     declare_alignment_publisher,
@@ -87,6 +88,10 @@ class Outbox:
     def send_map(self, robot_map: RobotMap, *, complete: bool) -> None:
         """Publish a version of the map, or all of it if `complete`."""
         self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
+
+    def send_past(self, run: PastRun) -> None:
+        """Publish the map of an earlier run."""
+        self._put("map", self._maps, run.payload)
 
     def send_alignments(self, message: AlignmentMessage) -> None:
         """Publish what was found out about a pair of robots."""

@@ -32,6 +32,7 @@ from mapweave_protocol.wire.messages import (
     MapMessage,
     StatusMessage,
 )
+from mapweave_protocol.wire.pairs import Run
 
 _log = logging.getLogger(__name__)
 
@@ -69,10 +70,11 @@ class Intake:
         self._maps = map_reader()
         self._alignments = alignment_reader()
         self._statuses = status_reader()
-        self._heard: dict[str, StatusMessage] = {}
+        self._heard: dict[Run, StatusMessage] = {}
         self._lacking = Lacking()
         self._assembler = MapAssembler()
-        self._packers: defaultdict[str, MapSender] = defaultdict(MapSender)
+        self._packers: defaultdict[Run, MapSender] = defaultdict(MapSender)
+        self._clashing: set[str] = set()
         self._too_large: set[str] = set()
         self._warned_of_too_many = False
 
@@ -114,7 +116,7 @@ class Intake:
         elif self._statuses.reads(arrival):
             status = self._statuses.read(arrival)
             if status is not None and self._hears({status.robot}):
-                self._heard[status.robot] = status
+                self._heard[status.robot, status.boot] = status
         elif (coordinator := read_coordinator(arrival)) is not None:
             boot, here = coordinator
             record(self._story.coordinator(boot, here=here))
@@ -124,26 +126,35 @@ class Intake:
     def robots_to_ask(self, now: float) -> list[str]:
         """Return those whose map, by what they have said, has not arrived; `now` [s], any clock."""
         heard, self._heard = self._heard, {}
-        return [robot for robot, status in heard.items() if self._lacks_map(status, now)]
+        return [robot for (robot, _), status in heard.items() if self._lacks_map(status, now)]
 
     def _lacks_map(self, status: StatusMessage, now: float) -> bool:
-        held = self._coordinator.map_of(status.robot)
-        state = (held.boot, held.version) if held is not None else None
-        newer = held is None or held.boot != status.boot or held.version < status.map_version
-        return self._lacking.due(status.robot, state, now, lacks=newer and status.submaps > 0)
+        held = self._coordinator.version_of(status.robot, status.boot)
+        lacks = status.submaps > 0 and (held is None or held < status.map_version)
+        return self._lacking.due(f"{status.robot} {status.boot}", held, now, lacks=lacks)
 
     def _take_map(self, message: MapMessage, received: float) -> None:
         new = self._assembler.update(message)
         # Kept complete, whatever part of it has just come.
         complete = self._pack(new) if new is not None else None
-        if new is not None and complete is not None and self._coordinator.receive_map(new):
-            self._store.keep_map(new.robot, received, complete)
+        if new is None or complete is None:
+            return
+        if self._coordinator.receive_map(new):
+            last = max(new.components)
+            self._store.keep_map((new.robot, new.boot), last, received, complete)
             record(self._story.mapped(new))
+        elif self._coordinator.clashes(new) and new.boot not in self._clashing:
+            self._clashing.add(new.boot)
+            _log.warning(
+                "map of %s ignored: another run of it has components of the same numbers; start its"
+                " agent again while the coordinator is here, with the --state it had",
+                new.robot,
+            )
 
     def _pack(self, robot_map: RobotMap) -> bytes | None:
         """Return the complete message; None if the parts that came make too large a whole."""
         try:
-            return self._packers[robot_map.robot].payload(robot_map, complete=True)
+            return self._packers[robot_map.robot, robot_map.boot].payload(robot_map, complete=True)
         except MessageError as error:
             if robot_map.robot not in self._too_large:
                 self._too_large.add(robot_map.robot)
@@ -152,8 +163,8 @@ class Intake:
 
     def _take_alignments(self, new: AlignmentMessage, payload: bytes, received: float) -> None:
         if self._coordinator.receive_alignments(new):
-            pair = new.reference.robot, new.other.robot
-            self._store.add_alignments(pair, received, payload)
+            reference, other = (f"{end.robot}@{end.boot}" for end in (new.reference, new.other))
+            self._store.add_alignments((reference, other), received, payload)
             record(self._story.aligned(new))
 
     def _take_presence(self, arrival: Arrival) -> None:

@@ -92,3 +92,22 @@ def test_a_status_is_answered_once() -> None:
     needs.coordinator(coordinator())
     needs.missing(state("a", 7), (), 0.0)
     assert needs.missing(state("a", 7), (), 10 * GRACE) == NOTHING
+
+
+@pytest.mark.parametrize(
+    ("held", "missing"),
+    [
+        ((), (state("a", 3, "before"),)),
+        ((state("a", 2, "before"),), (state("a", 3, "before"),)),
+        ((state("a", 3, "before"),), ()),
+    ],
+)
+def test_a_coordinator_gets_the_maps_of_earlier_runs_too(
+    held: tuple[MapVersion, ...], missing: tuple[MapVersion, ...]
+) -> None:
+    needs = Needs("a")
+    for now in (0.0, GRACE):
+        needs.coordinator(coordinator(state("a", 7), *held))
+        needs.peer(peer(state("a", 7)))
+        found = needs.missing(state("a", 7), (), now, [state("a", 3, "before")])
+    assert found == Missing(past=missing)

@@ -67,10 +67,11 @@ def _make_map(
     boot: str = "first",
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
     components: int = 1,
+    first: int = 0,
 ) -> RobotMap:
     trajectory = Trajectory(np.array([0]), np.array([0.0]), np.zeros((1, 3)))
     submaps = tuple(
-        Submap(number, number, np.zeros(3), _l_room(pose), trajectory)
+        Submap(number, first + number, np.zeros(3), _l_room(pose), trajectory)
         for number in range(components)
     )
     return RobotMap(robot, boot, version, submaps)
@@ -85,9 +86,11 @@ def _make_alignments(
     confidence: float = 0.9,
     reason: str = "40 m of wall in common",
 ) -> AlignmentMessage:
-    """Return what robot `reference` found for component 0 of both."""
-    names = component_name(reference.robot, 0), component_name(other.robot, 0)
-    alignment = Alignment(*names, np.array(transform), decision, confidence, Reason.words(reason))
+    """Return what robot `reference` found for the first component of both."""
+    ends = (component_name(m.robot, min(m.components, default=0)) for m in (reference, other))
+    ours, theirs = ends
+    cause = Reason.words(reason)
+    alignment = Alignment(ours, theirs, np.array(transform), decision, confidence, cause)
     return AlignmentMessage.pack(
         reference.robot, MapVersion.of(reference), MapVersion.of(other), [alignment]
     )

@@ -20,7 +20,7 @@ def empty(tmp_path: Path) -> Iterator[Store]:
 def store(empty: Store) -> Store:
     for number in (1, 2, 3):
         empty.add_version(number, 0.0, f"version {number}".encode())
-    empty.keep_map("a", 0.0, b"map of a")
+    empty.keep_map(("a", "x"), 0, 0.0, b"map of a")
     return empty
 
 

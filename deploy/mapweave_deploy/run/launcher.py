@@ -63,6 +63,8 @@ class Plan:
         Where the router listens, such as ``tcp/127.0.0.1:7447``.
     store
         The coordinator's file.
+    states
+        Folder of the agents' states, an empty one: earlier runs would be taken up.
     timeout
         When to give up [s]; None never does.
     config
@@ -74,6 +76,7 @@ class Plan:
     rate: str
     listen: str
     store: Path
+    states: Path
     timeout: float | None
     config: Path | None = None
 
@@ -177,7 +180,8 @@ def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
     first, behind_last = member.scans
     scans = ["--scans", f"{first}:{behind_last}"]
     source = ["--robot", member.robot, "--log", str(member.log), "--rate", plan.rate]
-    arguments = ["agent", *source, *scans, *plan.connection, *plan.computing]
+    state = ["--state", str(plan.states / member.robot)]
+    arguments = ["agent", *source, *scans, *state, *plan.connection, *plan.computing]
     crew.start(f"agent {member.robot}", AGENT, arguments)
 
 

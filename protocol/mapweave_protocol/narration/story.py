@@ -8,6 +8,7 @@ from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_
 from mapweave_protocol.narration.story_alignments import AlignmentStory
 from mapweave_protocol.narration.story_joint import JointStory
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
+from mapweave_protocol.wire.pairs import is_earlier_run
 
 
 @dataclass
@@ -105,6 +106,8 @@ class Story:
     def mapped(self, robot_map: RobotMap) -> Iterator[str]:
         """Tell that a robot lost its way or found it, and when its map is twice what was told."""
         state = self._robot(robot_map.robot)
+        if state.map is not None and is_earlier_run(robot_map, state.map):
+            return
         before, state.map = state.map, robot_map
         if before is not None and before.boot == robot_map.boot:
             yield from _tell_lost(before, robot_map)

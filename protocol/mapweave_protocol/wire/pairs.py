@@ -1,9 +1,10 @@
-"""Pairs of robots: who compares their maps, and which of two comparisons is older."""
+"""Pairs of robots and runs: who compares their maps, which of two comparisons or runs is older."""
 
 import zlib
 from collections.abc import Iterable
 from typing import TypeAlias
 
+from mapweave.maps import RobotMap
 from mapweave_protocol.wire.alignment_message import MapVersion
 
 Run: TypeAlias = tuple[str, str]  # robot and boot
@@ -32,3 +33,13 @@ def is_older(one: Iterable[MapVersion], another: Iterable[MapVersion]) -> bool:
         return False
     steps = [now[run] - before[run] for run in now]
     return max(steps) <= 0 and min(steps) < 0
+
+
+def is_earlier_run(one: RobotMap, another: RobotMap) -> bool:
+    """Tell whether `one` is of an earlier run of the robot of `another`, or of one without a map.
+
+    A run numbers its components above those of the runs before it.
+    """
+    if one.boot == another.boot or not another.submaps:
+        return False
+    return not one.submaps or max(one.components) < min(another.components)

@@ -24,7 +24,7 @@ from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.session import open_session
 
 SCANS = 60  # a few seconds of mapping
-PATIENCE = 60.0  # [s] for a machine with much else to do
+PATIENCE = 120.0  # [s] for a machine with much else to do
 
 
 def until(condition: Callable[[], object]) -> None:
@@ -41,13 +41,19 @@ def says(folder: Path, process: str, words: str) -> bool:
     return log.exists() and words in log.read_text()
 
 
+def plan_of(members: list[Member], folder: Path) -> Plan:
+    """Return a plan whose processes keep everything in `folder`."""
+    listen, store = free_endpoint(), folder / "store.sqlite"
+    return Plan("t", members, "max", listen, store, folder / "states", None)
+
+
 @pytest.fixture
 def plan(tmp_path: Path) -> Plan:
     """Return a team of one robot, with a short log."""
     [robot] = simulate("arena", 1, 1, tmp_path / "logs")
     nothing = np.empty(0, dtype=np.int64)
     member = Member("r1", robot.log, (0, SCANS), "arena", nothing, np.empty((0, 3)))
-    return Plan("t", [member], "max", free_endpoint(), tmp_path / "store.sqlite", None)
+    return plan_of([member], tmp_path)
 
 
 def end(crew: ProcessGroup, child: Child) -> None:
