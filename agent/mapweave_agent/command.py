@@ -84,9 +84,9 @@ def _run(options: argparse.Namespace) -> int:
     config = config_of(options)
     clock = ReplayClock(options.rate)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
+    source = LogSource.open(options.log, options.scans, _log.warning, config.sensor.angular_step)
     state = StateFolder(options.state or default_folder(team, robot))
     runs = state.runs(robot, time.time())
-    source = LogSource.open(options.log, options.scans, _log.warning, config.sensor.angular_step)
 
     def tell_waiting() -> None:
         _log.info("waiting for a router at %s", ", ".join(endpoints))

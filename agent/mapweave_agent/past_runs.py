@@ -80,7 +80,7 @@ class StateFolder:
 
         A file that is none is told and left where it is: it must not keep a robot from its work.
         """
-        found = [self._read(path, robot, now) for path in sorted(self.path.glob(f"*{SUFFIX}"))]
+        found = [self._read(path, robot, now) for path in sorted(self.path.glob(f"[!.]*{SUFFIX}"))]
         runs = [run for run in found if run is not None and run.map.submaps]
         return sorted(runs, key=lambda run: max(run.map.components))
 

@@ -21,7 +21,7 @@ from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.keys import everything
+from mapweave_protocol.wire.keys import COORDINATOR_LIVE, everything
 from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 
 ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
@@ -139,9 +139,7 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
         open_session([plan.listen], patience=ROUTER_PATIENCE) as session,
         session.declare_subscriber(everything(plan.team), inbox.put),
     ):
-        start_server(crew, plan, plan.store)
-        for member in plan.members:
-            start_agent(crew, plan, member)
+        _start_all(crew, plan, session)
         while not is_done(plan.robots, recorder.statuses):
             _follow(crew, inbox, recorder, display)
             _check_time(plan, deadline, _unfinished(plan, recorder))
@@ -166,6 +164,27 @@ def start_router(crew: ProcessGroup, plan: Plan) -> None:
             raise TeamTimeoutError(ROUTER_PATIENCE, ["router"])
         time.sleep(POLL / 4)
     crew.check()
+
+
+def _start_all(crew: ProcessGroup, plan: Plan, session: zenoh.Session) -> None:
+    """Start the coordinator and the agents."""
+    again = plan.store.exists()
+    start_server(crew, plan, plan.store)
+    deadline = time.monotonic() + ROUTER_PATIENCE
+    # On a store of runs before, agents number on from what the coordinator holds.
+    while again and not _is_coordinated(session, plan.team):
+        crew.check()
+        if time.monotonic() > deadline:
+            raise TeamTimeoutError(ROUTER_PATIENCE, ["coordinator"])
+        time.sleep(POLL)
+    for member in plan.members:
+        start_agent(crew, plan, member)
+
+
+def _is_coordinated(session: zenoh.Session, team: str) -> bool:
+    """Tell whether a coordinator of the team is there."""
+    tokens = session.liveliness().get(COORDINATOR_LIVE.pattern(team=team))
+    return any(reply.ok is not None for reply in tokens)
 
 
 def start_server(crew: ProcessGroup, plan: Plan, store: Path) -> None:
