@@ -75,7 +75,9 @@ def run(options: argparse.Namespace) -> None:
 def _run_team(members: list[Member], rate: str) -> TeamOutcome:
     with tempfile.TemporaryDirectory() as folder:
         store = Path(folder) / "store.sqlite"
-        plan = Plan("bench", members, rate, free_endpoint(), store, timeout=None)
+        plan = Plan(
+            "bench", members, rate, free_endpoint(), store, store.parent / "states", timeout=None
+        )
         with ProcessGroup(Path(folder)) as crew:
             return run_team(crew, plan, Lines(Console()))
 

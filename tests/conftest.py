@@ -1,6 +1,7 @@
 """What tests of several packages share."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,3 +19,11 @@ def data_dir() -> Path:
     if not DATA.is_dir():
         pytest.skip(f"no real laser logs at {DATA}; name their folder with MAPWEAVE_DATA")
     return DATA
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _state_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Have agents keep their runs where the tests' files are, not in the user's home."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield

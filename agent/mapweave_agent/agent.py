@@ -14,14 +14,23 @@ from mapweave.team.hysteresis import keep_joined
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
+from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
+from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.session import declare_subscriber
-from mapweave_protocol.wire.keys import ALIGNMENT, LIVE, MAP, STATUS
+from mapweave_protocol.wire.keys import (
+    ALIGNMENT,
+    COORDINATOR_LIVE,
+    JOINT_STATUS,
+    LIVE,
+    MAP,
+    STATUS,
+)
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
@@ -46,6 +55,12 @@ class Agent:
         Compares maps; it stays the caller's.
     total
         How many scans there will be, where known.
+    state
+        Where this run's map is kept.
+    past
+        The robot's earlier runs that belong to the team's map, the earliest first.
+    first
+        The number of this run's first component, above those of all runs before it.
     """
 
     def __init__(
@@ -56,6 +71,9 @@ class Agent:
         comparer: ComparisonWorker,
         total: int | None,
         parameters: AgentParameters,
+        state: StateFolder,
+        past: Sequence[PastRun] = (),
+        first: int = 0,
     ) -> None:
         self._session = session
         self._team = team
@@ -63,9 +81,15 @@ class Agent:
         self._comparer = comparer
         self._total = total
         self._parameters = parameters
+        self._state = state
+        self._past = {run.state: run for run in past}
+        self._first = first
         self._publication = PublicationSchedule(parameters.map_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
-        self._reception = Dispatcher(mapper.robot, mapper.boot, self._comparisons)
+        if past:
+            self._comparisons.earlier_map(past[-1].map)
+        self._needs = Needs(mapper.robot)
+        self._reception = Dispatcher(mapper.robot, mapper.boot, self._comparisons, self._needs)
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
         self._inbox = Inbox()
         self._published: RobotMap = mapper.robot_map()
@@ -138,8 +162,21 @@ class Agent:
         if self._changed and not self._finished and self._publication.due(now):
             self._publish_map(complete=False)
         self._compare(now)
+        self._supply(now)
         if now >= self._status_due:
             self._publish_status()
+
+    def _supply(self, now: float) -> None:
+        """Send again what others lack, and answer who has asked."""
+        own = MapVersion.of(self._published) if self._published.submaps else None
+        missing = self._needs.missing(own, self._outbox.found, now, self._past)
+        if missing.map:
+            self._outbox.send_map(self._published, complete=True)
+        for run in missing.past:
+            self._outbox.send_past(self._past[run])
+        for message in missing.alignments:
+            self._outbox.send_alignments(message)
+        self._outbox.answer(self._published)
 
     def _compare(self, now: float) -> None:
         """Publish the outcome of the comparison under way, if there is one; begin the next."""
@@ -173,8 +210,10 @@ class Agent:
         return found
 
     def _publish_map(self, *, complete: bool) -> None:
-        self._published = without_strays(self._mapper.robot_map())
+        mapped = without_strays(self._mapper.robot_map())
+        self._published = numbered_from(mapped, self._first)
         self._outbox.send_map(self._published, complete=complete)
+        self._state.keep(self._published)
         self._comparisons.own_map(self._published, finished=self._finished)
         self._publication.published(time.monotonic())
         self._changed = False
@@ -192,6 +231,7 @@ class Agent:
             submaps=len(self._published.submaps),
             map_version=self._published.version,
             compared=dict(self._comparisons.published),
+            holds=self._comparisons.held,
             sent=dict(self._outbox.sent),
         )
         self._outbox.send_status(status)
@@ -202,14 +242,17 @@ class Agent:
         """Subscribe to the peers' presence, then to what they say."""
         robot, put = self._mapper.robot, self._inbox.put
         live, maps = LIVE.pattern(team=self._team), MAP.pattern(team=self._team)
+        coordinators = COORDINATOR_LIVE.pattern(team=self._team)
         as_reference = ALIGNMENT.pattern(team=self._team, reference=robot)
         as_other = ALIGNMENT.pattern(team=self._team, other=robot)
         with (
             self._session.liveliness().declare_subscriber(live, put, history=True),
+            self._session.liveliness().declare_subscriber(coordinators, put, history=True),
             declare_subscriber(self._session, as_reference, put),
             declare_subscriber(self._session, as_other, put),
             declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
             self._session.declare_subscriber(STATUS.pattern(team=self._team), put),
+            self._session.declare_subscriber(JOINT_STATUS.build(team=self._team), put),
         ):
             yield
 

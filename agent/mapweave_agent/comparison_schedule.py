@@ -7,7 +7,7 @@ from mapweave.maps import Alignment, RobotMap
 from mapweave.team.hysteresis import joins
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_protocol.wire.messages import AlignmentMessage, Compared, MapVersion
-from mapweave_protocol.wire.pairs import ordered, responsible
+from mapweave_protocol.wire.pairs import is_earlier_run, ordered, responsible
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +87,15 @@ class ComparisonSchedule:
         self._own_finished = finished
 
     def peer_map(self, robot_map: RobotMap) -> None:
-        """Take in a peer's map."""
-        self._peer(robot_map.robot).newest = robot_map
+        """Take in a peer's map, unless one of a later run is known."""
+        peer = self._peer(robot_map.robot)
+        if peer.newest is None or not is_earlier_run(robot_map, peer.newest):
+            peer.newest = robot_map
+
+    def earlier_map(self, robot_map: RobotMap) -> None:
+        """Take in the map of this robot's run before this one: it is compared as a peer's."""
+        earlier = self._peer(robot_map.robot)
+        earlier.newest, earlier.last = robot_map, (robot_map.boot, robot_map.version)
 
     def peer_finished(self, robot: str, boot: str, version: int) -> None:
         """Note that the map of that version is a peer's last."""
@@ -122,9 +129,9 @@ class ComparisonSchedule:
         newest = self._peers[min(due)[1]].newest if due else None
         if own is None or newest is None:
             return None
-        maps = {robot_map.robot: robot_map for robot_map in (own, newest)}
-        reference, other = ordered(own.robot, newest.robot)
-        return Comparison(newest.robot, maps[reference], maps[other])
+        first, _ = ordered(own.robot, newest.robot)
+        pair = (own, newest) if own.robot == first else (newest, own)
+        return Comparison(newest.robot, *pair)
 
     def have_met(self, comparison: Comparison) -> bool:
         """Tell whether the two runs that `comparison` is of were joined once."""
@@ -147,6 +154,13 @@ class ComparisonSchedule:
         """By peer, the versions we compared last."""
         peers = self._peers.items()
         return {name: peer.published for name, peer in peers if peer.published is not None}
+
+    @property
+    def held(self) -> tuple[MapVersion, ...]:
+        """Which state of each peer's map is here."""
+        names = sorted(self._peers.keys() - {self._robot})
+        newest = (self._peers[name].newest for name in names)
+        return tuple(MapVersion.of(robot_map) for robot_map in newest if robot_map is not None)
 
     @property
     def idle(self) -> bool:

@@ -3,12 +3,16 @@
 import logging
 
 from mapweave_agent.comparison_schedule import ComparisonSchedule
+from mapweave_agent.needs import Needs
 from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.link.inbox import (
     Arrival,
     Presence,
     alignment_reader,
+    joint_status_reader,
     map_reader,
+    read_coordinator,
     read_presence,
     status_reader,
 )
@@ -25,42 +29,64 @@ class Dispatcher:
         Of this run: what it published itself is no news.
     plan
         Told what is news.
+    needs
+        Told what others hold.
     """
 
-    def __init__(self, robot: str, boot: str, plan: ComparisonSchedule) -> None:
+    def __init__(self, robot: str, boot: str, plan: ComparisonSchedule, needs: Needs) -> None:
         self._robot = robot
-        self._boot = boot
         self._plan = plan
+        self._needs = needs
         self._maps = map_reader()
         self._statuses = status_reader()
         self._alignments = alignment_reader()
+        self._joint_statuses = joint_status_reader()
+        self._coordinators = Claimants()
+        self._namesakes = Claimants()
+        self._namesakes.take(boot, here=True)
         self._assembler = MapAssembler()
 
     @property
     def refused(self) -> int:
         """How many messages were not what they should be."""
-        return self._maps.refused + self._statuses.refused + self._alignments.refused
+        readers = self._maps, self._statuses, self._alignments, self._joint_statuses
+        return sum(reader.refused for reader in readers)
 
     def take(self, arrival: Arrival) -> None:
         """Take in what arrived."""
-        presence = read_presence(arrival)
+        presence, coordinator = read_presence(arrival), read_coordinator(arrival)
         if presence is not None:
             self._take_presence(presence)
+        elif coordinator is not None:
+            self._take_coordinator(*coordinator)
         elif self._maps.reads(arrival):
             self._take_map(arrival)
         elif self._statuses.reads(arrival):
             self._take_status(arrival)
         elif self._alignments.reads(arrival):
             self._take_alignment(arrival)
+        elif self._joint_statuses.reads(arrival):
+            self._take_joint_status(arrival)
 
     def _take_presence(self, presence: Presence) -> None:
         if presence.robot == self._robot:
-            if presence.boot != self._boot and presence.here:
-                _log.warning("another run of %s is here, too: its maps will mix", self._robot)
+            count = self._namesakes.take(presence.boot, here=presence.here)
+            if count:
+                _log.warning(tell_robots(self._robot, count))
         elif presence.here:
             self._plan.peer_here(presence.robot, presence.boot)
         else:
             self._plan.peer_gone(presence.robot, presence.boot)
+
+    def _take_coordinator(self, boot: str, here: bool) -> None:
+        count = self._coordinators.take(boot, here=here)
+        if count:
+            _log.warning(tell_coordinators(count))
+
+    def _take_joint_status(self, arrival: Arrival) -> None:
+        status = self._joint_statuses.read(arrival)
+        if status is not None:
+            self._needs.coordinator(status)
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)
@@ -71,7 +97,10 @@ class Dispatcher:
 
     def _take_status(self, arrival: Arrival) -> None:
         status = self._statuses.read(arrival)
-        if status is not None and status.robot != self._robot and status.state == "finished":
+        if status is None or status.robot == self._robot:
+            return
+        self._needs.peer(status)
+        if status.state == "finished":
             self._plan.peer_finished(status.robot, status.boot, status.map_version)
 
     def _take_alignment(self, arrival: Arrival) -> None:

@@ -1,7 +1,8 @@
-"""What a robot publishes, counted."""
+"""What a robot publishes, counted; and what it answers when it is asked for all of it."""
 
+import logging
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from types import TracebackType
 
@@ -9,11 +10,20 @@ import zenoh
 import zenoh.ext as ze
 
 from mapweave.maps import RobotMap
+from mapweave_agent.past_runs import PastRun
 from mapweave_protocol.link.assembler import MapSender
-from mapweave_protocol.link.session import declare_alignment_publisher, declare_map_publisher
+from mapweave_protocol.link.session import (
+    declare_alignment_publisher,
+    declare_map_publisher,
+    declare_status_publisher,
+)
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.keys import ALIGNMENT, LIVE, MAP, STATUS
+from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, STATUS
 from mapweave_protocol.wire.messages import AlignmentMessage, StatusMessage, Traffic
+
+WAITING_QUERIES = 16
+
+_log = logging.getLogger(__name__)
 
 
 class Outbox:
@@ -32,6 +42,7 @@ class Outbox:
         self._boot = boot
         self._sender = MapSender()
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
+        self._found: dict[tuple[str, str], AlignmentMessage] = {}
         self._messages: Counter[str] = Counter()
         self._bytes: Counter[str] = Counter()
         self._declared = ExitStack()
@@ -39,15 +50,15 @@ class Outbox:
     def __enter__(self) -> "Outbox":
         with ExitStack() as stack:
             keep = stack.enter_context
+            query_key = AGENT_QUERY.build(team=self._team, robot=self._robot)
             map_key = MAP.build(team=self._team, robot=self._robot)
             status_key = STATUS.build(team=self._team, robot=self._robot)
             live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
             self._maps = keep(declare_map_publisher(self._session, map_key))
-            self._statuses = keep(
-                self._session.declare_publisher(
-                    status_key, congestion_control=zenoh.CongestionControl.DROP
-                )
-            )
+            self._statuses = keep(declare_status_publisher(self._session, status_key))
+            questions: zenoh.handlers.RingChannel[zenoh.Query]
+            questions = zenoh.handlers.RingChannel(WAITING_QUERIES)
+            self._asked = keep(self._session.declare_queryable(query_key, questions))
             # Last, so that who sees the robot can already hear it.
             keep(self._session.liveliness().declare_token(live_key))
             self._declared = stack.pop_all()
@@ -69,25 +80,51 @@ class Outbox:
             for kind, count in self._messages.items()
         }
 
+    @property
+    def found(self) -> Iterable[AlignmentMessage]:
+        """What was published last of each pair of robots."""
+        return self._found.values()
+
     def send_map(self, robot_map: RobotMap, *, complete: bool) -> None:
         """Publish a version of the map, or all of it if `complete`."""
         self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
+
+    def send_past(self, run: PastRun) -> None:
+        """Publish the map of an earlier run."""
+        self._put("map", self._maps, run.payload)
 
     def send_alignments(self, message: AlignmentMessage) -> None:
         """Publish what was found out about a pair of robots."""
         pair = message.reference.robot, message.other.robot
         publisher = self._alignments.get(pair)
         if publisher is None:
-            key = ALIGNMENT.build(
-                team=self._team, robot=self._robot, reference=pair[0], other=pair[1]
-            )
-            publisher = declare_alignment_publisher(self._session, key)
+            publisher = declare_alignment_publisher(self._session, self._key_of(message))
             self._alignments[pair] = self._declared.enter_context(publisher)
+        self._found[pair] = message
         self._put("alignment", publisher, encode(message))
 
     def send_status(self, message: StatusMessage) -> None:
         """Publish how far the robot is."""
         self._put("status", self._statuses, encode(message))
+
+    def answer(self, robot_map: RobotMap) -> None:
+        """Give who has asked the whole of `robot_map`, as published last, and what was found."""
+        while (query := self._asked.handler.try_recv()) is not None:
+            with query:
+                self._answer(query, robot_map)
+
+    def _answer(self, query: zenoh.Query, robot_map: RobotMap) -> None:
+        try:
+            map_key = MAP.build(team=self._team, robot=self._robot)
+            query.reply(map_key, self._sender.payload(robot_map, complete=True))
+            for message in self._found.values():
+                query.reply(self._key_of(message), encode(message))
+        except zenoh.ZError as error:
+            _log.warning("an answer could not be sent: %s", error)
+
+    def _key_of(self, message: AlignmentMessage) -> str:
+        reference, other = message.reference.robot, message.other.robot
+        return ALIGNMENT.build(team=self._team, robot=self._robot, reference=reference, other=other)
 
     def _put(
         self, kind: str, publisher: ze.AdvancedPublisher | zenoh.Publisher, payload: bytes

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rich.console import Console
 from rich.text import Text
@@ -87,8 +88,12 @@ def run(options: argparse.Namespace) -> int:
     folder.create()
     _say(console, [_source(options)])
     # The crew stops before what it wrote to is removed.
-    with _unfinished_store(folder.store) as new, ProcessGroup(folder.logs) as crew:
-        plan = _plan(options, folder, options.store or new)
+    with (
+        _unfinished_store(folder.store) as new,
+        TemporaryDirectory(prefix="mapweave-") as states,
+        ProcessGroup(folder.logs) as crew,
+    ):
+        plan = _plan(options, folder, options.store or new, Path(states))
         _say(console, [_how_to_watch(plan)])
         with open_display(console, plan.members) as display:
             outcome = run_team(crew, plan, display)
@@ -104,7 +109,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _plan(options: argparse.Namespace, folder: Folder, store: Path) -> Plan:
+def _plan(options: argparse.Namespace, folder: Folder, store: Path, states: Path) -> Plan:
     return Plan(
         team=options.team,
         members=_members(options, folder),
@@ -113,6 +118,7 @@ def _plan(options: argparse.Namespace, folder: Folder, store: Path) -> Plan:
         store=store,
         timeout=options.timeout,
         config=options.config,
+        states=states,
     )
 
 

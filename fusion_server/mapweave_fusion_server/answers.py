@@ -1,6 +1,7 @@
 """What the store says to a query: payloads, or why there is none."""
 
 from collections.abc import Iterator
+from itertools import islice
 
 from mapweave.errors import MapweaveError
 from mapweave_fusion_server.store import Store
@@ -23,7 +24,7 @@ def answer(store: Store, parameters: str) -> Iterator[bytes]:
     """
     query = JointQuery.parse(parameters)
     if query.since is not None:
-        yield from store.versions_since(query.since)
+        yield from islice(store.versions_since(query.since), query.limit)
     elif query.robot is not None:
         yield _found(store.map_of(query.robot), f"no map of robot {query.robot}")
     elif query.version is not None:

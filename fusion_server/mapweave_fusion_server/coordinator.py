@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -17,8 +16,9 @@ from mapweave.team.joint_optimization import JointOptimizer
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
 from mapweave.team.revocation import mark_revoked
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
+from mapweave_protocol.wire.pairs import Run, is_older, states_of
 
-Run: TypeAlias = tuple[str, str]  # robot and boot
+MAX_RUNS = 64  # of a robot: a new battery every hour for a week of days
 REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
 
 
@@ -92,10 +92,9 @@ class Coordinator:
         self._version = last.version if last else 0
         self._judged = last.alignments if last else ()
         self._names: set[str] = set()
-        self._maps: dict[str, RobotMap] = {}
-        self._states: dict[str, dict[int, dict[int, SubmapPlace]]] = {}
-        self._alignments: dict[frozenset[str], AlignmentMessage] = {}
-        self._runs_over: set[Run] = set()
+        self._maps: dict[Run, RobotMap] = {}
+        self._states: dict[Run, dict[int, dict[int, SubmapPlace]]] = {}
+        self._alignments: dict[frozenset[Run], AlignmentMessage] = {}
         self._urgency = Urgency.NONE
         self._draft: Draft | None = None
         self._begun = -math.inf
@@ -105,9 +104,34 @@ class Coordinator:
         """Whether something that matters is in no draft yet."""
         return self._urgency > Urgency.NONE
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether something was received that is in no version yet."""
+        return self.has_news or self._draft is not None
+
+    @property
+    def maps_held(self) -> tuple[MapVersion, ...]:
+        """Which state of the map of each run of each robot is here."""
+        return tuple(MapVersion.of(self._maps[run]) for run in sorted(self._maps))
+
+    @property
+    def alignments_held(self) -> tuple[tuple[MapVersion, MapVersion], ...]:
+        """Of which states of the maps the alignments of each pair are that are here."""
+        return tuple((held.reference, held.other) for held in self._alignments.values())
+
     def map_of(self, robot: str) -> RobotMap | None:
-        """Return a robot's last map, None when there is none."""
-        return self._maps.get(robot)
+        """Return the map of a robot's last run, None when there is none."""
+        return max(self._runs_of(robot), key=lambda m: max(m.components), default=None)
+
+    def version_of(self, robot: str, boot: str) -> int | None:
+        """Return which version of the map of a run is here, None if none is."""
+        held = self._maps.get((robot, boot))
+        return None if held is None else held.version
+
+    def clashes(self, new: RobotMap) -> bool:
+        """Tell whether another run of the robot has components of the same names."""
+        others = [m for m in self._runs_of(new.robot) if m.boot != new.boot]
+        return any(not set(new.components).isdisjoint(m.components) for m in others)
 
     def admits(self, robots: Set[str]) -> bool:
         """Return whether these robots are listened to; from the first time they are."""
@@ -119,19 +143,18 @@ class Coordinator:
     def receive_map(self, new: RobotMap) -> bool:
         """Take a robot's map; return whether it is news.
 
-        It is not when it is no newer than the one known, of a run that another one replaced (two
-        robots under one name must not replace each other for ever), or empty: a run that has
-        mapped nothing yet does not replace what an earlier one mapped.
+        Each run of a robot has its map, and none replaces another's. It is no news when it is no
+        newer than the one known, or empty; nor when its components have the names of another
+        run's, or the robot has too many runs.
         """
-        if not new.submaps or not self.admits({new.robot}) or _run(new) in self._runs_over:
+        if not new.submaps or not self.admits({new.robot}) or self.clashes(new):
             return False
-        known = self._maps.get(new.robot)
-        if known is not None and known.boot != new.boot:
-            self._runs_over.add(_run(known))
-            del self._states[new.robot]
-        elif known is not None and known.version >= new.version:
+        known = self._maps.get(_run(new))
+        if known is not None and known.version >= new.version:
             return False
-        self._maps[new.robot] = new
+        if known is None and len(self._runs_of(new.robot)) >= MAX_RUNS:
+            return False
+        self._maps[_run(new)] = new
         self._remember_state(new)
         self._raise_urgency(Urgency.SOON)
         return True
@@ -139,16 +162,15 @@ class Coordinator:
     def receive_alignments(self, new: AlignmentMessage) -> bool:
         """Take what was found for a pair of robots; return whether it is news.
 
-        It is not when what is known was computed from newer maps or says the same, or when a
-        run it is about is over.
+        It is not when what is known was computed from newer maps of the same runs or says the same.
         """
-        pair = pair_of(new)
-        if not self.admits(pair) or not self._runs_over.isdisjoint(_sources(new)):
+        if not self.admits(pair_of(new)):
             return False
-        known = self._alignments.get(pair)
-        if known is not None and _is_older(new, known):
+        runs = frozenset(states_of(_ends(new)))
+        known = self._alignments.get(runs)
+        if known is not None and is_older(_ends(new), _ends(known)):
             return False
-        self._alignments[pair] = new
+        self._alignments[runs] = new
         if known is not None and new.alignments == known.alignments:
             return False
         joined_or_parted = _accepted_links(new) != _accepted_links(known)
@@ -171,7 +193,7 @@ class Coordinator:
         """Return the draft of the next version, made of all that is known; `finish` must follow."""
         if self._draft is not None:
             raise RuntimeError("the last draft is not finished")
-        maps = tuple(self._maps[robot] for robot in sorted(self._maps))
+        maps = tuple(sorted(self._maps.values(), key=lambda m: (m.robot, min(m.components))))
         alignments = tuple(self._alignments_in_force())
         self._draft = Draft(self._version + 1, maps, alignments, self._judged)
         self._begun, self._urgency = now, Urgency.NONE
@@ -184,32 +206,35 @@ class Coordinator:
         self._draft = None
 
     def _alignments_in_force(self) -> Iterator[Alignment]:
-        """Yield the alignments between components that exist, of the runs that last mapped them."""
-        runs = {_run(robot_map) for robot_map in self._maps.values()}
+        """Yield the alignments between components that exist."""
         existing = {
             component_name(robot_map.robot, component)
             for robot_map in self._maps.values()
             for component in robot_map.components
         }
         for message in self._alignments.values():
-            if runs.issuperset(_sources(message)):
-                changes = {k.robot: self._change(k) for k in (message.reference, message.other)}
+            if self._maps.keys() >= states_of(_ends(message)).keys():
+                first, second = (self._change(end) for end in _ends(message))
                 for alignment in message.unpack():
                     if {alignment.reference, alignment.other} <= existing:
-                        ends = alignment.reference, alignment.other
-                        ours, theirs = (changes[parse_component(name)[0]] for name in ends)
+                        robot, _ = parse_component(alignment.reference)
+                        straight = robot == message.reference.robot
+                        ours, theirs = (first, second) if straight else (second, first)
                         yield carry(alignment, ours, theirs)
 
+    def _runs_of(self, robot: str) -> list[RobotMap]:
+        return [robot_map for run, robot_map in self._maps.items() if run[0] == robot]
+
     def _remember_state(self, robot_map: RobotMap) -> None:
-        states = self._states.setdefault(robot_map.robot, {})
+        states = self._states.setdefault(_run(robot_map), {})
         states[robot_map.version] = places_of(robot_map)
         while len(states) > REMEMBERED_STATES:
             del states[min(states)]
 
     def _change(self, source: MapVersion) -> Change:
         """Return what became of a map since the state `source`; nothing, if that is not known."""
-        now = self._maps[source.robot]
-        then = self._states[source.robot].get(source.version)
+        now = self._maps[_run(source)]
+        then = self._states[_run(source)].get(source.version)
         return Change(places_of(now) if then is None else then, now)
 
     def _raise_urgency(self, urgency: Urgency) -> None:
@@ -221,18 +246,8 @@ def pair_of(message: AlignmentMessage) -> frozenset[str]:
     return frozenset({message.reference.robot, message.other.robot})
 
 
-def _is_older(new: AlignmentMessage, known: AlignmentMessage) -> bool:
-    """Whether `new` was computed from maps of the same runs of which none is newer, one older."""
-    now, before = _sources(new), _sources(known)
-    if now.keys() != before.keys():
-        return False
-    steps = [now[run] - before[run] for run in now]
-    return max(steps) <= 0 and min(steps) < 0
-
-
-def _sources(message: AlignmentMessage) -> dict[Run, int]:
-    """Return the version of the map of each run that was compared."""
-    return {_run(source): source.version for source in (message.reference, message.other)}
+def _ends(message: AlignmentMessage) -> tuple[MapVersion, MapVersion]:
+    return message.reference, message.other
 
 
 def _run(source: RobotMap | MapVersion) -> Run:

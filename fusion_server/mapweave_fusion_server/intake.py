@@ -15,11 +15,24 @@ from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler, MapSender
-from mapweave_protocol.link.inbox import Arrival, alignment_reader, map_reader
+from mapweave_protocol.link.inbox import (
+    Arrival,
+    alignment_reader,
+    map_reader,
+    read_coordinator,
+    status_reader,
+)
+from mapweave_protocol.link.lacking import Lacking
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.keys import LIVE
-from mapweave_protocol.wire.messages import AlignmentMessage, JointMapMessage, MapMessage
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    JointMapMessage,
+    MapMessage,
+    StatusMessage,
+)
+from mapweave_protocol.wire.pairs import Run
 
 _log = logging.getLogger(__name__)
 
@@ -56,15 +69,19 @@ class Intake:
         self._story = story
         self._maps = map_reader()
         self._alignments = alignment_reader()
+        self._statuses = status_reader()
+        self._heard: dict[Run, StatusMessage] = {}
+        self._lacking = Lacking()
         self._assembler = MapAssembler()
-        self._packers: defaultdict[str, MapSender] = defaultdict(MapSender)
+        self._packers: defaultdict[Run, MapSender] = defaultdict(MapSender)
+        self._clashing: set[str] = set()
         self._too_large: set[str] = set()
         self._warned_of_too_many = False
 
     @property
     def refused(self) -> int:
         """How many messages were dropped because they were not what they should be."""
-        return self._maps.refused + self._alignments.refused
+        return self._maps.refused + self._alignments.refused + self._statuses.refused
 
     def restore(self) -> None:
         """Take up what the store remembers; what the last version was made of is no news.
@@ -96,21 +113,48 @@ class Intake:
             message = self._alignments.read(arrival)
             if message is not None and self._hears(pair_of(message)):
                 self._take_alignments(message, arrival.payload, received)
+        elif self._statuses.reads(arrival):
+            status = self._statuses.read(arrival)
+            if status is not None and self._hears({status.robot}):
+                self._heard[status.robot, status.boot] = status
+        elif (coordinator := read_coordinator(arrival)) is not None:
+            boot, here = coordinator
+            record(self._story.coordinator(boot, here=here))
         elif LIVE.matches(arrival.key):
             self._take_presence(arrival)
+
+    def robots_to_ask(self, now: float) -> list[str]:
+        """Return those whose map, by what they have said, has not arrived; `now` [s], any clock."""
+        heard, self._heard = self._heard, {}
+        return [robot for (robot, _), status in heard.items() if self._lacks_map(status, now)]
+
+    def _lacks_map(self, status: StatusMessage, now: float) -> bool:
+        held = self._coordinator.version_of(status.robot, status.boot)
+        lacks = status.submaps > 0 and (held is None or held < status.map_version)
+        return self._lacking.due(f"{status.robot} {status.boot}", held, now, lacks=lacks)
 
     def _take_map(self, message: MapMessage, received: float) -> None:
         new = self._assembler.update(message)
         # Kept complete, whatever part of it has just come.
         complete = self._pack(new) if new is not None else None
-        if new is not None and complete is not None and self._coordinator.receive_map(new):
-            self._store.keep_map(new.robot, received, complete)
+        if new is None or complete is None:
+            return
+        if self._coordinator.receive_map(new):
+            last = max(new.components)
+            self._store.keep_map((new.robot, new.boot), last, received, complete)
             record(self._story.mapped(new))
+        elif self._coordinator.clashes(new) and new.boot not in self._clashing:
+            self._clashing.add(new.boot)
+            _log.warning(
+                "map of %s ignored: another run of it has components of the same numbers; start its"
+                " agent again while the coordinator is here, with the --state it had",
+                new.robot,
+            )
 
     def _pack(self, robot_map: RobotMap) -> bytes | None:
         """Return the complete message; None if the parts that came make too large a whole."""
         try:
-            return self._packers[robot_map.robot].payload(robot_map, complete=True)
+            return self._packers[robot_map.robot, robot_map.boot].payload(robot_map, complete=True)
         except MessageError as error:
             if robot_map.robot not in self._too_large:
                 self._too_large.add(robot_map.robot)
@@ -119,8 +163,8 @@ class Intake:
 
     def _take_alignments(self, new: AlignmentMessage, payload: bytes, received: float) -> None:
         if self._coordinator.receive_alignments(new):
-            pair = new.reference.robot, new.other.robot
-            self._store.add_alignments(pair, received, payload)
+            reference, other = (f"{end.robot}@{end.boot}" for end in (new.reference, new.other))
+            self._store.add_alignments((reference, other), received, payload)
             record(self._story.aligned(new))
 
     def _take_presence(self, arrival: Arrival) -> None:

@@ -17,14 +17,18 @@ from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.link import session
+from mapweave_protocol.link.asking import request_all_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.messages import JointStatusMessage
 
 POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
 ANSWERERS = 4  # one slow asker must not keep the others waiting
 WAITING_QUERIES = 256
+STATUS_INTERVAL = 1.0  # [s]
 
 _log = logging.getLogger(__name__)
 
@@ -67,6 +71,8 @@ class Service:
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
+        self._boot = keys.new_boot()
+        self._status_due = 0.0
         self._builder = VersionBuilder(store.series, config or Config())
 
     def run(self, stopping: Callable[[], bool]) -> None:
@@ -78,7 +84,7 @@ class Service:
             If the store cannot be written.
         """
         joint_key = keys.JOINT_MAP.build(team=self._team)
-        with self._builder, self._answering(), self._listening():
+        with self._builder, self._answering(), self._listening(), self._announced():
             self._publisher = session.declare_joint_publisher(self._session, joint_key)
             self._publish_again()
             _log.info("coordinating team %s", self._team)
@@ -94,8 +100,14 @@ class Service:
             self._intake.take(arrival, time.time())
         if self._builder.is_ready:
             self._conclude()
-        if self._coordinator.seconds_until_due(time.monotonic()) <= 0:
+        now = time.monotonic()
+        if self._coordinator.seconds_until_due(now) <= 0:
             self._begin()
+        for robot in self._intake.robots_to_ask(now):
+            request_all_of(self._session, self._team, robot, self._inbox.put)
+        if now >= self._status_due:
+            self._publish_status()
+            self._status_due = now + STATUS_INTERVAL
 
     def _finish(self) -> None:
         """Take what has arrived and publish what it makes."""
@@ -128,17 +140,44 @@ class Service:
             self._publisher.put(latest)
             _log.info("version %d published again", self._store.latest_version)
 
+    def _publish_status(self) -> None:
+        status = JointStatusMessage(
+            boot=self._boot,
+            stamp=time.time(),
+            series=self._store.series,
+            version=self._store.latest_version,
+            pending=self._coordinator.is_pending,
+            maps=self._coordinator.maps_held,
+            alignments=self._coordinator.alignments_held,
+        )
+        self._statuses.put(encode(status))
+
+    @contextmanager
+    def _announced(self) -> Iterator[None]:
+        """Say that a coordinator is here, and how far it is."""
+        token = keys.COORDINATOR_LIVE.build(team=self._team, boot=self._boot)
+        status_key = keys.JOINT_STATUS.build(team=self._team)
+        with (
+            session.declare_status_publisher(self._session, status_key) as self._statuses,
+            self._session.liveliness().declare_token(token),
+        ):
+            yield
+
     @contextmanager
     def _listening(self) -> Iterator[None]:
         """Subscribe to maps, alignments and who is there."""
         maps = keys.MAP.pattern(team=self._team)
         alignments = keys.ALIGNMENT.pattern(team=self._team)
+        statuses = keys.STATUS.pattern(team=self._team)
         live = keys.LIVE.pattern(team=self._team)
+        others = keys.COORDINATOR_LIVE.pattern(team=self._team)
         put = self._inbox.put
         with ExitStack() as stack:
             for subscriber in (
                 session.declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
                 session.declare_subscriber(self._session, alignments, put),
+                self._session.declare_subscriber(statuses, put),
+                self._session.liveliness().declare_subscriber(others, put, history=True),
                 self._session.liveliness().declare_subscriber(live, put, history=True),
             ):
                 stack.enter_context(subscriber)

@@ -16,7 +16,7 @@ from typing import Any
 from mapweave.errors import FileError
 
 APPLICATION_ID = 0x4D505756  # "MPWV", in the file's header (SQLite file format, 1.3.17)
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 _HEADER_LENGTH = 100
 _MAGIC = b"SQLite format 3\0"
 
@@ -32,14 +32,17 @@ CREATE TABLE version (
 CREATE TABLE alignment (
     id INTEGER PRIMARY KEY,
     received REAL NOT NULL,
-    first TEXT NOT NULL,             -- robots of the pair, in ascending order
+    first TEXT NOT NULL,             -- runs of the pair, in ascending order
     second TEXT NOT NULL,
     message BLOB NOT NULL);
 CREATE INDEX alignment_pair ON alignment (first, second);
 CREATE TABLE robot_map (
-    robot TEXT PRIMARY KEY,
+    robot TEXT NOT NULL,
+    boot TEXT NOT NULL,              -- of the run
+    last_component INTEGER NOT NULL, -- higher for a later run
     received REAL NOT NULL,
-    message BLOB NOT NULL);
+    message BLOB NOT NULL,
+    PRIMARY KEY (robot, boot));
 """
 
 
@@ -116,30 +119,38 @@ class Store:
                 yield message
 
     def add_alignments(self, pair: tuple[str, str], received: float, message: bytes) -> None:
-        """Keep what was found for a pair of robots, beside all that was found before."""
+        """Keep what was found for a pair of runs, beside all that was found before."""
         self._rows(
             "INSERT INTO alignment (received, first, second, message) VALUES (?, ?, ?, ?)",
             received, *sorted(pair), message,
         )  # fmt: skip
 
     def last_alignments(self) -> list[bytes]:
-        """Return the last message of every pair of robots."""
+        """Return the last message of every pair of runs."""
         return self._blobs(
             "SELECT message FROM alignment WHERE id IN"
             " (SELECT max(id) FROM alignment GROUP BY first, second) ORDER BY id"
         )
 
-    def keep_map(self, robot: str, received: float, message: bytes) -> None:
-        """Keep a robot's map in place of its last one."""
-        self._rows("INSERT OR REPLACE INTO robot_map VALUES (?, ?, ?)", robot, received, message)
+    def keep_map(
+        self, run: tuple[str, str], last_component: int, received: float, message: bytes
+    ) -> None:
+        """Keep the map of a run, a robot and a boot, in place of the last one of that run."""
+        self._rows(
+            "INSERT OR REPLACE INTO robot_map VALUES (?, ?, ?, ?, ?)",
+            *run, last_component, received, message,
+        )  # fmt: skip
 
     def map_of(self, robot: str) -> bytes | None:
-        """Return a robot's last map, None when it was never heard of."""
-        return self._blob("SELECT message FROM robot_map WHERE robot = ?", robot)
+        """Return the map of a robot's last run, None when it was never heard of."""
+        return self._blob(
+            "SELECT message FROM robot_map WHERE robot = ? ORDER BY last_component DESC LIMIT 1",
+            robot,
+        )
 
     def last_maps(self) -> list[bytes]:
-        """Return the last map of every robot, also of those that are gone."""
-        return self._blobs("SELECT message FROM robot_map ORDER BY robot")
+        """Return the last map of every run of every robot, also of those that are gone."""
+        return self._blobs("SELECT message FROM robot_map ORDER BY robot, last_component")
 
     @property
     def holds_news(self) -> bool:

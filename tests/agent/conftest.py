@@ -49,3 +49,9 @@ def endpoint() -> Iterator[str]:
 def team() -> str:
     """Return the name of a team of this test's own."""
     return f"t{secrets.token_hex(4)}"
+
+
+@pytest.fixture(autouse=True)
+def _no_earlier_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have agents keep their runs in a folder of the test's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

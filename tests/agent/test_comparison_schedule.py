@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapweave.maps import Alignment, Decision, RobotMap
+from mapweave.maps import Alignment, Decision, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason
 from mapweave_agent.comparison_schedule import Comparison, ComparisonSchedule
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
@@ -174,6 +174,30 @@ def test_the_map_of_another_run_is_compared_anew() -> None:
     plan.done(comparison, 1.0, 1.0)
     plan.peer_map(a_map(SECOND, 1, boot="y"))
     assert plan.begin(1e9) is not None
+
+
+def a_run(robot: str, component: int, boot: str) -> RobotMap:
+    submap = Submap(0, component, np.zeros(3), LineMap.empty(), Trajectory.empty())
+    return RobotMap(robot, boot, 1, (submap,))
+
+
+def test_a_run_is_compared_with_the_one_before_it_once_for_each_of_its_maps() -> None:
+    plan = ComparisonSchedule("a", PARAMETERS)
+    earlier, own = a_run("a", 0, "before"), a_run("a", 1, "now")
+    plan.earlier_map(earlier)
+    plan.own_map(own, finished=True)
+    comparison = plan.begin(0.0)
+    assert comparison == Comparison("a", own, earlier)
+    plan.done(comparison, now=0.0, took=1.0)
+    assert plan.begin(0.1) is None
+    assert plan.held == ()
+
+
+def test_a_map_of_an_earlier_run_of_a_peer_does_not_replace_that_of_the_later() -> None:
+    plan = plan_of("a", "b")
+    for robot_map in (a_run("b", 1, "now"), a_run("b", 0, "before")):
+        plan.peer_map(robot_map)
+    assert plan.held == (MapVersion(robot="b", boot="now", version=1),)
 
 
 def test_pairs_take_turns() -> None:

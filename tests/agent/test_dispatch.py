@@ -7,6 +7,7 @@ from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.dispatch import Dispatcher
+from mapweave_agent.needs import Needs
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.wire import keys
@@ -58,7 +59,7 @@ class Robot:
     def __init__(self, name: str) -> None:
         self.plan = ComparisonSchedule(name, AgentParameters())
         self.plan.own_map(a_map(name), finished=True)
-        self._dispatcher = Dispatcher(name, "x", self.plan)
+        self._dispatcher = Dispatcher(name, "x", self.plan, Needs(name))
 
     def hears(self, *arrivals: Arrival) -> None:
         """Take in what arrives, in this order."""
@@ -92,7 +93,7 @@ def test_another_run_of_the_robot_itself_is_nobody_to_compare_with(
 ) -> None:
     robot = Robot(OURS)
     robot.hears(token_of(OURS, boot="y"), token_of(OURS, boot="x"))
-    assert caplog.text.count("another run of") == 1
+    assert caplog.text.count("2 agents call themselves") == 1
     assert robot.plan.idle
 
 

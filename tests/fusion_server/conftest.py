@@ -67,10 +67,11 @@ def _make_map(
     boot: str = "first",
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
     components: int = 1,
+    first: int = 0,
 ) -> RobotMap:
     trajectory = Trajectory(np.array([0]), np.array([0.0]), np.zeros((1, 3)))
     submaps = tuple(
-        Submap(number, number, np.zeros(3), _l_room(pose), trajectory)
+        Submap(number, first + number, np.zeros(3), _l_room(pose), trajectory)
         for number in range(components)
     )
     return RobotMap(robot, boot, version, submaps)
@@ -85,9 +86,11 @@ def _make_alignments(
     confidence: float = 0.9,
     reason: str = "40 m of wall in common",
 ) -> AlignmentMessage:
-    """Return what robot `reference` found for component 0 of both."""
-    names = component_name(reference.robot, 0), component_name(other.robot, 0)
-    alignment = Alignment(*names, np.array(transform), decision, confidence, Reason.words(reason))
+    """Return what robot `reference` found for the first component of both."""
+    ends = (component_name(m.robot, min(m.components, default=0)) for m in (reference, other))
+    ours, theirs = ends
+    cause = Reason.words(reason)
+    alignment = Alignment(ours, theirs, np.array(transform), decision, confidence, cause)
     return AlignmentMessage.pack(
         reference.robot, MapVersion.of(reference), MapVersion.of(other), [alignment]
     )
@@ -252,8 +255,9 @@ def start_server(endpoint: str, team: str, tmp_path: Path) -> Iterator[StartServ
     """Return what starts a server of the team on its store, and waits until it serves."""
     with ExitStack() as stack:
 
-        def start(*, interval: float = 0.0) -> ServerProcess:
-            server = ServerProcess(endpoint, team, tmp_path / "store.sqlite", interval)
+        def start(*, interval: float = 0.0, store: Path | None = None) -> ServerProcess:
+            file = store or tmp_path / "store.sqlite"
+            server = ServerProcess(endpoint, team, file, interval)
             stack.callback(server.stop, signal.SIGKILL)
             server.wait_for_log(f"coordinating team {team}")
             return server

@@ -20,7 +20,7 @@ def empty(tmp_path: Path) -> Iterator[Store]:
 def store(empty: Store) -> Store:
     for number in (1, 2, 3):
         empty.add_version(number, 0.0, f"version {number}".encode())
-    empty.keep_map("a", 0.0, b"map of a")
+    empty.keep_map(("a", "x"), 0, 0.0, b"map of a")
     return empty
 
 
@@ -32,6 +32,7 @@ def store(empty: Store) -> Store:
         ("since=1", [b"version 2", b"version 3"]),
         ("since=0", [b"version 1", b"version 2", b"version 3"]),
         ("since=3", []),
+        ("since=0;limit=2", [b"version 1", b"version 2"]),
         ("robot=a", [b"map of a"]),
     ],
 )

@@ -12,7 +12,12 @@ import pytest
 from mapweave.geometry import se2
 from mapweave.maps import JointMap, RobotMap
 from mapweave.team.joint_optimization import JointOptimizer
-from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters, Draft
+from mapweave_fusion_server.coordinator import (
+    MAX_RUNS,
+    Coordinator,
+    CoordinatorParameters,
+    Draft,
+)
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import JointMapMessage
 from mapweave_protocol.wire.model import WORLD_REACH
@@ -176,13 +181,31 @@ def test_an_older_map_of_the_same_run_is_ignored(make_map: MakeMap) -> None:
     assert coordinator.map_of("a") is newest
 
 
-def test_another_run_replaces_the_map_and_ends_the_run_before_it(make_map: MakeMap) -> None:
+def test_each_run_of_a_robot_keeps_its_map(make_map: MakeMap) -> None:
     coordinator = _coordinator()
-    coordinator.receive_map(make_map("a", 9, boot="first"))
-    second = make_map("a", 1, boot="second")
+    first, second = make_map("a", 9, boot="first"), make_map("a", 1, boot="second", first=1)
     assert coordinator.receive_map(second)
-    assert not coordinator.receive_map(make_map("a", 10, boot="first"))
+    assert coordinator.receive_map(first)
     assert coordinator.map_of("a") is second
+    assert coordinator.version_of("a", "first") == 9
+    assert _make_version(coordinator).maps == (first, second)
+
+
+def test_a_run_that_claims_the_components_of_another_one_takes_nothing_from_it(
+    make_map: MakeMap,
+) -> None:
+    coordinator = _coordinator()
+    first, second = make_map("a", 9, boot="first"), make_map("a", 1, boot="second")
+    assert coordinator.receive_map(first)
+    assert coordinator.clashes(second)
+    assert not coordinator.receive_map(second)
+    assert coordinator.receive_map(make_map("a", 10, boot="first"))
+
+
+def test_of_one_robot_there_are_no_more_runs_than_so_many(make_map: MakeMap) -> None:
+    coordinator = _coordinator()
+    runs = [make_map("a", boot=f"b{number}", first=number) for number in range(MAX_RUNS + 1)]
+    assert [coordinator.receive_map(run) for run in runs] == [True] * MAX_RUNS + [False]
 
 
 def test_a_run_that_has_mapped_nothing_yet_replaces_nothing(make_map: MakeMap) -> None:
@@ -193,30 +216,18 @@ def test_a_run_that_has_mapped_nothing_yet_replaces_nothing(make_map: MakeMap) -
     assert coordinator.map_of("a") is first
 
 
-def test_alignments_of_a_run_that_is_over_are_dropped(
+def test_alignments_of_a_run_that_is_over_stay(
     make_map: MakeMap, make_alignments: MakeAlignments
 ) -> None:
     coordinator = _coordinator()
-    a, b = make_map("a"), make_map("b")
-    coordinator.receive_map(a)
-    coordinator.receive_map(b)
-    coordinator.receive_alignments(make_alignments(a, b))
-    assert _decisions(_make_version(coordinator)) == ["accepted"]
-    coordinator.receive_map(make_map("a", boot="second"))
-    assert _decisions(_make_version(coordinator)) == []
-
-
-def test_late_alignments_of_a_run_that_is_over_replace_nothing(
-    make_map: MakeMap, make_alignments: MakeAlignments
-) -> None:
-    coordinator = _coordinator()
-    a, b = make_map("a"), make_map("b")
-    second = make_map("a", boot="second")
+    a, b, second = make_map("a"), make_map("b"), make_map("a", boot="second", first=1)
     for robot_map in (a, b, second):
         coordinator.receive_map(robot_map)
-    coordinator.receive_alignments(make_alignments(second, b))
-    assert not coordinator.receive_alignments(make_alignments(a, b, "refused"))
-    assert _decisions(_make_version(coordinator)) == ["accepted"]
+    coordinator.receive_alignments(make_alignments(a, b))
+    coordinator.receive_alignments(make_alignments(second, b, "refused"))
+    coordinator.receive_alignments(make_alignments(second, a))
+    pairs = [(al.reference, al.other) for al in _make_version(coordinator).alignments]
+    assert pairs == [("a/0", "b/0"), ("a/1", "b/0"), ("a/1", "a/0")]
 
 
 def test_alignments_that_arrive_before_their_maps_count_once_those_are_there(

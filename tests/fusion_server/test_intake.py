@@ -11,8 +11,11 @@ from mapweave_fusion_server.intake import Intake
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Arrival
+from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.narration.story import Story
-from mapweave_protocol.wire.keys import MAP
+from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.keys import MAP, STATUS
+from mapweave_protocol.wire.messages import StatusMessage
 
 SEGMENTS = 180_000  # of random numbers: four submaps fit into a message, eight do not
 
@@ -42,3 +45,36 @@ def test_a_map_that_is_too_large_as_a_whole_is_logged_once_and_dropped(
     assert held.version == 1
     assert [line for line in caplog.messages if "map of a ignored" in line] == caplog.messages
     assert len(caplog.messages) == 1
+
+
+def _status(version: int, boot: str = "first", submaps: int = 1) -> Arrival:
+    counts = dict.fromkeys(("scans_seen", "scans_placed", "components"), 1)
+    fields = {"robot": "a", "boot": boot, "stamp": 0.0, "state": "mapping"}
+    message = StatusMessage.model_validate(
+        {**counts, **fields, "submaps": submaps, "map_version": version}
+    )
+    return Arrival(STATUS.build(team="t", robot="a"), encode(message))
+
+
+@pytest.mark.parametrize(
+    ("status", "asked"),
+    [
+        (_status(3), []),
+        (_status(4), ["a"]),
+        (_status(1, "another"), ["a"]),
+        (_status(1, "another", submaps=0), []),
+    ],
+)
+def test_a_robot_whose_map_has_not_come_is_asked_for_it(
+    tmp_path: Path, status: Arrival, asked: list[str]
+) -> None:
+    lines = LineMap.empty()
+    held = RobotMap("a", "first", 3, (Submap(0, 0, np.zeros(3), lines, Trajectory.empty()),))
+    with Store(tmp_path / "store.sqlite", "t") as store:
+        intake = Intake(Coordinator(CoordinatorParameters()), store, Story())
+        intake.take(Arrival(MAP.build(team="t", robot="a"), MapSender().payload(held)), 0.0)
+        intake.take(status, 0.0)
+        assert intake.robots_to_ask(0.0) == []  # it may be on its way
+        intake.take(status, 0.0)
+        assert intake.robots_to_ask(GRACE) == asked
+        assert intake.robots_to_ask(10 * GRACE) == []  # nothing was heard since

@@ -2,21 +2,37 @@
 
 from __future__ import annotations
 
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import zenoh
 
 import mapweave_protocol
+from mapweave.maps import JointMap
+from mapweave_fusion_server.store import Store
 from mapweave_protocol.link.asking import ask_joint_maps, ask_robot_map
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire import keys
-from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.messages import MapMessage
+from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.messages import (
+    JointMapMessage,
+    JointStatusMessage,
+    MapMessage,
+    MapVersion,
+    StatusMessage,
+)
 from mapweave_protocol.wire.queries import JointQuery
 
+HISTORY = 300  # versions: more than wait at a subscriber
+
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from tests.fusion_server.conftest import (
         Found,
         MakeAlignments,
@@ -116,13 +132,13 @@ def test_hostile_messages_are_dropped_and_told_of(
     server = start_server()
     watcher = network.watcher()
     mallory = network.connect()
-    robot = f"mapweave/@v1/{network.team}/agent/m"
+    robot = f"mapweave/v2/{network.team}/agent/m"
     someone = encode(MapMessage.pack(make_map("a")))
     for payload in (b"", b"\xc1", b"\xdd\xff\xff\xff\xff", someone[:-7], someone):
-        for key in (f"{robot}/map", f"{robot}/alignment/m/a", "mapweave/@v1/{team}/agent/M !/map"):
+        for key in (f"{robot}/map", f"{robot}/alignment/m/a", "mapweave/v2/{team}/agent/M !/map"):
             mallory.put(key.format(team=network.team), payload)
     with (
-        mallory.liveliness().declare_token(f"mapweave/@v1/{network.team}/@live/M !/x"),
+        mallory.liveliness().declare_token(f"mapweave/v2/{network.team}/live/agent/M !/x"),
         network.robot("a") as a,
     ):
         a.publish_map(make_map("a"))
@@ -132,3 +148,69 @@ def test_hostile_messages_are_dropped_and_told_of(
     assert server.stop() == 0
     assert "messages were not valid and dropped" in server.log
     assert "Traceback" not in server.log
+
+
+def test_a_map_that_did_not_come_is_asked_for(
+    network: Network, start_server: StartServer, make_map: MakeMap
+) -> None:
+    start_server()
+    watcher, silent = network.watcher(), network.connect()
+    parts = {"team": network.team, "robot": "a"}
+    robot_map = make_map("a")
+
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply(keys.MAP.build(**parts), encode(MapMessage.pack(robot_map)))
+
+    counts = dict.fromkeys(("scans_seen", "scans_placed", "components", "submaps"), 1)
+    fields = {"robot": "a", "boot": robot_map.boot, "stamp": 0.0, "state": "finished"}
+    status = StatusMessage.model_validate({**counts, **fields, "map_version": robot_map.version})
+    with silent.declare_queryable(keys.AGENT_QUERY.build(**parts), answer):
+        for _ in range(6):
+            silent.put(keys.STATUS.build(**parts), encode(status))
+            time.sleep(0.5)
+        assert network.groups(watcher.next()) == [["a/0"]]
+
+
+def test_two_coordinators_of_a_team_say_so_both(start_server: StartServer, tmp_path: Path) -> None:
+    servers = [start_server(), start_server(store=tmp_path / "other.sqlite")]
+    for server in servers:
+        server.wait_for_log("2 coordinators of the team are here")
+
+
+@pytest.mark.usefixtures("finished_team")
+def test_a_coordinator_says_what_it_holds(network: Network, found: Found) -> None:
+    heard: list[bytes] = []
+    key = keys.JOINT_STATUS.build(team=network.team)
+    with network.connect().declare_subscriber(key, lambda s: heard.append(s.payload.to_bytes())):
+        deadline = time.monotonic() + network.patience
+        while not heard and time.monotonic() < deadline:
+            time.sleep(0.05)
+    status = decode(JointStatusMessage, heard[0])
+    assert (status.version, status.pending) == (3, False)
+    map_a, map_b, alignments = found
+    assert status.maps == (MapVersion.of(map_a), MapVersion.of(map_b))
+    assert status.alignments == ((alignments.reference, alignments.other),)
+
+
+def test_who_listened_before_a_coordinator_with_a_long_history_gets_the_latest_then_the_next(
+    network: Network, start_server: StartServer, make_map: MakeMap, tmp_path: Path
+) -> None:
+    with Store(tmp_path / "store.sqlite", network.team) as store:
+        for version in range(1, HISTORY + 1):
+            message = JointMapMessage.pack(JointMap(version, (), ()), store.series)
+            store.add_version(version, 0.0, encode(message))
+    with ThreadPoolExecutor() as pool:
+        heard = pool.submit(_versions, network, 2)
+        time.sleep(1.0)  # it listens, most likely; if not, it gets the same
+        start_server()
+        with network.robot("a") as a:
+            a.publish_map(make_map("a"))
+            assert heard.result(network.patience) == [HISTORY, HISTORY + 1]
+
+
+def _versions(network: Network, count: int) -> list[int]:
+    joints = mapweave_protocol.joint_maps(
+        network.team, connect=[network.endpoint], timeout=network.patience
+    )
+    return [joint.version for joint in islice(joints, count)]

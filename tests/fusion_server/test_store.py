@@ -31,8 +31,9 @@ def test_everything_is_still_there_after_a_restart(path: Path) -> None:
     with Store(path, "rescue") as store:
         series = store.series
         _fill(store, 3)
-        store.keep_map("a", 5.0, b"old map")
-        store.keep_map("a", 6.0, b"map")
+        store.keep_map(("a", "x"), 3, 5.0, b"old map")
+        store.keep_map(("a", "x"), 3, 6.0, b"map")
+        store.keep_map(("a", "w"), 1, 7.0, b"map of the run before")
         store.add_alignments(("b", "a"), 5.5, b"refused")
         store.add_alignments(("a", "b"), 6.5, b"accepted")
     with Store(path, "rescue") as store:
@@ -41,7 +42,7 @@ def test_everything_is_still_there_after_a_restart(path: Path) -> None:
         assert store.version(2) == b"version 2"
         assert list(store.versions_since(1)) == [b"version 2", b"version 3"]
         assert store.map_of("a") == b"map"
-        assert store.last_maps() == [b"map"]
+        assert store.last_maps() == [b"map of the run before", b"map"]
         assert store.last_alignments() == [b"accepted"]
 
 
@@ -59,7 +60,7 @@ def test_versions_follow_each_other_without_a_gap(path: Path, number: int) -> No
 def test_news_is_what_came_after_the_last_version_was_begun(path: Path) -> None:
     with Store(path, "rescue") as store:
         assert not store.holds_news
-        store.keep_map("a", 5.0, b"map")
+        store.keep_map(("a", "x"), 0, 5.0, b"map")
         assert store.holds_news
         store.add_version(1, 6.0, b"version 1")
         assert not store.holds_news
@@ -111,7 +112,7 @@ def _overwritten(path: Path) -> None:
          "not a mapweave store"),
         (lambda path: path.write_bytes(b"SQLite"), "not a mapweave store"),
         (_foreign_database, "another program's"),
-        (_later_schema, "schema 99, expected 1"),
+        (_later_schema, "schema 99, expected 2"),
         (_cut_off, "damaged"),
         (_overwritten, "damaged"),
     ],

@@ -21,12 +21,12 @@ from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.keys import COORDINATOR_LIVE, everything
 from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 
 ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
 ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things
 POLL = 0.2  # [s] after which a dead process or the end is noticed
-EVERYTHING = "mapweave/@v1/{team}/**"
 CAPACITY = 100_000  # messages waiting to be counted
 
 _log = logging.getLogger(__name__)
@@ -63,6 +63,8 @@ class Plan:
         Where the router listens, such as ``tcp/127.0.0.1:7447``.
     store
         The coordinator's file.
+    states
+        Folder of the agents' states, an empty one: earlier runs would be taken up.
     timeout
         When to give up [s]; None never does.
     config
@@ -74,6 +76,7 @@ class Plan:
     rate: str
     listen: str
     store: Path
+    states: Path
     timeout: float | None
     config: Path | None = None
 
@@ -134,11 +137,9 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
     recorder, inbox = Recorder(), Inbox(CAPACITY)
     with (
         open_session([plan.listen], patience=ROUTER_PATIENCE) as session,
-        session.declare_subscriber(EVERYTHING.format(team=plan.team), inbox.put),
+        session.declare_subscriber(everything(plan.team), inbox.put),
     ):
-        start_server(crew, plan, plan.store)
-        for member in plan.members:
-            start_agent(crew, plan, member)
+        _start_all(crew, plan, session)
         while not is_done(plan.robots, recorder.statuses):
             _follow(crew, inbox, recorder, display)
             _check_time(plan, deadline, _unfinished(plan, recorder))
@@ -165,6 +166,27 @@ def start_router(crew: ProcessGroup, plan: Plan) -> None:
     crew.check()
 
 
+def _start_all(crew: ProcessGroup, plan: Plan, session: zenoh.Session) -> None:
+    """Start the coordinator and the agents."""
+    again = plan.store.exists()
+    start_server(crew, plan, plan.store)
+    deadline = time.monotonic() + ROUTER_PATIENCE
+    # On a store of runs before, agents number on from what the coordinator holds.
+    while again and not _is_coordinated(session, plan.team):
+        crew.check()
+        if time.monotonic() > deadline:
+            raise TeamTimeoutError(ROUTER_PATIENCE, ["coordinator"])
+        time.sleep(POLL)
+    for member in plan.members:
+        start_agent(crew, plan, member)
+
+
+def _is_coordinated(session: zenoh.Session, team: str) -> bool:
+    """Tell whether a coordinator of the team is there."""
+    tokens = session.liveliness().get(COORDINATOR_LIVE.pattern(team=team))
+    return any(reply.ok is not None for reply in tokens)
+
+
 def start_server(crew: ProcessGroup, plan: Plan, store: Path) -> None:
     """Start the coordinator on `store`."""
     crew.start(
@@ -177,7 +199,8 @@ def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
     first, behind_last = member.scans
     scans = ["--scans", f"{first}:{behind_last}"]
     source = ["--robot", member.robot, "--log", str(member.log), "--rate", plan.rate]
-    arguments = ["agent", *source, *scans, *plan.connection, *plan.computing]
+    state = ["--state", str(plan.states / member.robot)]
+    arguments = ["agent", *source, *scans, *state, *plan.connection, *plan.computing]
     crew.start(f"agent {member.robot}", AGENT, arguments)
 
 

@@ -1,12 +1,13 @@
 """Questions to the coordinator, answered from its store."""
 
+from collections.abc import Callable
 from typing import TypeVar
 
 import zenoh
 
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.keys import JOINT_QUERY
+from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY
 from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.queries import JointQuery
@@ -30,6 +31,21 @@ def ask_joint_maps(
     return sorted(answers, key=lambda message: message.version)
 
 
+def ask_latest(
+    session: zenoh.Session, team: str, timeout: float = ANSWER_WITHIN
+) -> tuple[JointMapMessage | None, bool]:
+    """Return the latest joint map, None if there is none, and whether a coordinator answered.
+
+    Raises
+    ------
+    MessageError
+        If an answer is not valid.
+    """
+    replies = list(session.get(JOINT_QUERY.build(team=team), timeout=timeout))
+    maps = [decode(JointMapMessage, reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
+    return max(maps, key=lambda message: message.version, default=None), bool(replies)
+
+
 def ask_robot_map(
     session: zenoh.Session, team: str, robot: str, timeout: float = ANSWER_WITHIN
 ) -> MapMessage | None:
@@ -44,6 +60,30 @@ def ask_robot_map(
     if any(message.robot != robot for message in answers):
         raise MessageError(MapMessage.format, f"answer about another robot than {robot!r}")
     return max(answers, key=lambda message: message.version, default=None)
+
+
+def request_all_of(
+    session: zenoh.Session, team: str, robot: str, on_sample: Callable[[zenoh.Sample], None]
+) -> None:
+    """Ask `robot` for its whole map and what it found; each comes as if it were published again.
+
+    Parameters
+    ----------
+    on_sample
+        Called in a thread of Zenoh's.
+    """
+
+    def take(reply: zenoh.Reply) -> None:
+        if reply.ok:
+            on_sample(reply.ok)
+
+    session.get(
+        AGENT_QUERY.build(team=team, robot=robot),
+        take,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        accept_replies=zenoh.ReplyKeyExpr.ANY,
+        timeout=ANSWER_WITHIN,
+    )
 
 
 def _ask(

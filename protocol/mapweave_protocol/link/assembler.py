@@ -5,7 +5,6 @@ since the last time outweighs it: the total stays within twice the changes, and 
 late, or missed something, soon has the whole map.
 """
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -136,31 +135,24 @@ class MapAssembler:
     """
 
     def __init__(self) -> None:
-        self._runs: dict[str, _Run] = {}
-        self._past: dict[str, deque[str]] = {}
+        self._runs: dict[str, dict[str, _Run]] = {}  # by robot and boot
 
     def update(self, message: MapMessage) -> RobotMap | None:
         """Take in `message`; return the newest map if that is now complete and was not before."""
         run = self._run(message)
-        if run is None:
-            return None
         run.take(message)
         return run.deliver()
 
     def missing(self, robot: str) -> bool:
         """Tell whether a newer map of `robot` is known of than could be put together."""
-        run = self._runs.get(robot)
-        return run is not None and run.newest is not None and run.newest.version > run.delivered
+        runs = self._runs.get(robot, {}).values()
+        return any(r.newest is not None and r.newest.version > r.delivered for r in runs)
 
-    def _run(self, message: MapMessage) -> _Run | None:
-        """Return what is held of the run of `message`, None if another run came after it."""
-        run = self._runs.get(message.robot)
-        if run is not None and run.boot == message.boot:
-            return run
-        past = self._past.setdefault(message.robot, deque(maxlen=REMEMBERED_BOOTS))
-        if message.boot in past:
-            return None
-        if run is not None:
-            past.append(run.boot)
-        self._runs[message.robot] = _Run(message.boot)
-        return self._runs[message.robot]
+    def _run(self, message: MapMessage) -> _Run:
+        """Return what is held of the run of `message`; of too many, the longest unheard goes."""
+        runs = self._runs.setdefault(message.robot, {})
+        run = runs.pop(message.boot, None) or _Run(message.boot)
+        runs[message.boot] = run
+        if len(runs) > REMEMBERED_BOOTS:
+            del runs[next(iter(runs))]
+        return run

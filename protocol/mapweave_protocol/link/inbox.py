@@ -12,10 +12,20 @@ import zenoh
 from mapweave.errors import MapweaveError
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, LIVE, MAP, STATUS, KeyFormat
+from mapweave_protocol.wire.keys import (
+    ALIGNMENT,
+    COORDINATOR_LIVE,
+    JOINT_MAP,
+    JOINT_STATUS,
+    LIVE,
+    MAP,
+    STATUS,
+    KeyFormat,
+)
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
+    JointStatusMessage,
     MapMessage,
     StatusMessage,
 )
@@ -127,6 +137,18 @@ def read_presence(arrival: Arrival) -> Presence | None:
     return Presence(parts["robot"], parts["boot"], here=not arrival.gone)
 
 
+def read_coordinator(arrival: Arrival) -> tuple[str, bool] | None:
+    """Return the boot of a coordinator and whether it is here, None if `arrival` is no token."""
+    if not COORDINATOR_LIVE.matches(arrival.key):
+        return None
+    try:
+        boot = COORDINATOR_LIVE.parse(arrival.key)["boot"]
+    except MapweaveError as error:
+        _log.warning("%s: ignored, %s", arrival.key, error)
+        return None
+    return boot, not arrival.gone
+
+
 def check_origin(message: Message, parts: Mapping[str, str]) -> None:
     """Check that a message says of itself what its key says.
 
@@ -168,3 +190,8 @@ def alignment_reader() -> Reader[AlignmentMessage]:
 def joint_reader() -> Reader[JointMapMessage]:
     """Return a reader of joint maps."""
     return Reader(JointMapMessage, JOINT_MAP)
+
+
+def joint_status_reader() -> Reader[JointStatusMessage]:
+    """Return a reader of the coordinator's statuses."""
+    return Reader(JointStatusMessage, JOINT_STATUS)

@@ -7,6 +7,8 @@ from mapweave_protocol.wire.messages import JointMapMessage
 from mapweave_protocol.wire.queries import JointQuery
 
 MAX_WAITING = 64
+ASKED_AT_ONCE = 32  # versions: a long history comes in portions
+SHORT_HISTORY = 16  # versions: what a coordinator's cache holds
 MAX_TRIES = 5
 REMEMBERED_SERIES = 16
 
@@ -16,13 +18,15 @@ class JointSequence:
 
     Parameters
     ----------
-    from_the_first
-        Whether there was no joint map yet when listening began: then version 1 is the first to
-        deliver, otherwise the first that arrives.
+    whole_up_to
+        If the first version that arrives is higher, it is the first to deliver, and the earlier
+        ones are history; otherwise version 1 is.
     """
 
-    def __init__(self, *, from_the_first: bool) -> None:
-        self._last = 0 if from_the_first else None
+    def __init__(self, *, whole_up_to: int) -> None:
+        self._whole_up_to = whole_up_to
+        self._last: int | None = None
+        self._newest = 0
         self._series: str | None = None
         self._past: deque[str] = deque(maxlen=REMEMBERED_SERIES)
         self._waiting: dict[int, JointMapMessage] = {}
@@ -31,19 +35,29 @@ class JointSequence:
     @property
     def gap(self) -> JointQuery | None:
         """What to ask for before anything can be delivered; None if nothing is missing."""
-        return JointQuery(since=self._last or 0) if self._waiting else None
+        if self._newest <= (self._last or 0):
+            return None
+        if self._last is None:
+            return JointQuery()
+        return JointQuery(since=self._last, limit=ASKED_AT_ONCE)
 
     def offer(self, message: JointMapMessage) -> None:
         """Take in `message`, unless it is old."""
         if not self._follow(message.series):
             return
         if self._last is None:
-            self._last = message.version - 1
+            self._last = 0 if message.version <= self._whole_up_to else message.version - 1
+        self._newest = max(self._newest, message.version)
         if message.version > self._last:
             self._waiting[message.version] = message
         while len(self._waiting) > MAX_WAITING:
             # The newest can be asked for again.
             del self._waiting[max(self._waiting)]
+
+    def expect(self, series: str, version: int) -> None:
+        """Note that there is a version, whether or not it arrives; another series is none of it."""
+        if self._series in (None, series):
+            self._newest = max(self._newest, version)
 
     def take(self) -> JointMap | None:
         """Return the next joint map, None if it is not here."""
@@ -69,12 +83,13 @@ class JointSequence:
         return skipped
 
     def _follow(self, series: str) -> bool:
-        """Tell whether `series` is the one to follow; a new one begins at 1 again."""
+        """Tell whether `series` is the one to follow; a new one has numbers of its own."""
         if series in self._past:
             return False
         if self._series is not None and series != self._series:
             self._past.append(self._series)
             self._waiting.clear()
-            self._last, self._tries = 0, 0
+            self._last, self._newest, self._tries = None, 0, 0
+            self._whole_up_to = SHORT_HISTORY
         self._series = series
         return True

@@ -172,6 +172,11 @@ def declare_joint_publisher(session: zenoh.Session, key: str) -> ze.AdvancedPubl
     return _declare_publisher(session, key, 16)
 
 
+def declare_status_publisher(session: zenoh.Session, key: str) -> zenoh.Publisher:
+    """Return a publisher of statuses: the next one says all that a lost one said."""
+    return session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+
+
 def _declare_publisher(session: zenoh.Session, key: str, cached: int) -> ze.AdvancedPublisher:
     return ze.declare_advanced_publisher(
         session,

@@ -13,7 +13,7 @@ import zenoh
 
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.asking import ask_joint_maps
+from mapweave_protocol.link.asking import ask_joint_maps, ask_latest
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
 from mapweave_protocol.link.inbox import (
     Arrival,
@@ -21,14 +21,15 @@ from mapweave_protocol.link.inbox import (
     Reader,
     alignment_reader,
     joint_reader,
+    joint_status_reader,
     map_reader,
     status_reader,
 )
-from mapweave_protocol.link.sequence import JointSequence
+from mapweave_protocol.link.sequence import SHORT_HISTORY, JointSequence
 from mapweave_protocol.link.session import declare_subscriber, open_session
-from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, MAP, STATUS
+from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, JOINT_STATUS, MAP, STATUS
 from mapweave_protocol.wire.messages import AlignmentMessage, JointMapMessage, StatusMessage
-from mapweave_protocol.wire.model import Message
+from mapweave_protocol.wire.model import MAX_COUNT, Message
 from mapweave_protocol.wire.queries import JointQuery
 
 POLL = 0.5  # [s] after which a gap is asked about again
@@ -42,7 +43,8 @@ def joint_maps(
 ) -> Iterator[JointMap]:
     """Yield the team's joint maps in the order of their versions, without a gap.
 
-    The first is the latest there is; who began to listen before there was any gets 1, 2, 3…
+    The first is the latest there is; who began to listen before there was any gets 1, 2, 3… Who
+    began before there was a coordinator gets the latest of its history, or all of a short one.
 
     Parameters
     ----------
@@ -62,12 +64,20 @@ def joint_maps(
     UnreachableError
         If no router answers within `timeout`.
     """
-    with _listening(JOINT_MAP.pattern(team=team), connect, timeout, 1) as (session, inbox):
+    said = Inbox()
+    with (
+        _listening(JOINT_MAP.pattern(team=team), connect, timeout, 1) as (session, inbox),
+        session.declare_subscriber(JOINT_STATUS.build(team=team), said.put),
+    ):
+        sequence = _begin(session, team)
 
         def ask(query: JointQuery) -> list[JointMapMessage]:
             return _ask(session, team, query)
 
-        yield from _in_order(_read(joint_reader(), inbox, timeout), ask)
+        def expect() -> None:
+            _expect(sequence, said)
+
+        yield from _in_order(sequence, _read(joint_reader(), inbox, timeout), expect, ask)
 
 
 def robot_maps(
@@ -123,39 +133,62 @@ def _read(reader: Reader[M], inbox: Inbox, timeout: float | None) -> Iterator[M 
         yield message
 
 
+def _begin(session: zenoh.Session, team: str) -> JointSequence:
+    """Return a sequence that holds the latest joint map there is."""
+    try:
+        latest, answered = ask_latest(session, team)
+    except MessageError as error:
+        _log.warning("answer ignored, %s", error)
+        latest, answered = None, False
+    if latest is None:
+        # A coordinator that has none yet will count from 1; if there is none, its store may be old.
+        return JointSequence(whole_up_to=MAX_COUNT if answered else SHORT_HISTORY)
+    sequence = JointSequence(whole_up_to=0)
+    sequence.offer(latest)
+    return sequence
+
+
+def _expect(sequence: JointSequence, said: Inbox) -> None:
+    """Have `sequence` expect the versions that the coordinator has said to have."""
+    reader = joint_status_reader()
+    while (arrival := said.get(0.0)) is not None:
+        status = reader.read(arrival)
+        if status is not None:
+            sequence.expect(status.series, status.version)
+
+
 def _in_order(
+    sequence: JointSequence,
     messages: Iterator[JointMapMessage | None],
+    expect: Callable[[], None],
     ask: Callable[[JointQuery], list[JointMapMessage]],
 ) -> Iterator[JointMap]:
-    """Yield the joint maps of `messages` in order; ask for the latest, and for what is missing."""
-    latest = ask(JointQuery())
-    sequence = JointSequence(from_the_first=not latest)
-    for message in latest:
-        sequence.offer(message)
+    """Yield the joint maps of `messages` in order; ask for what is missing."""
     yield from iter(sequence.take, None)
     for new in messages:
         if new is not None:
             sequence.offer(new)
         yield from iter(sequence.take, None)
-        if sequence.gap is not None:
-            yield from _close_gap(sequence, sequence.gap, ask)
+        expect()
+        yield from _close_gap(sequence, ask)
 
 
 def _close_gap(
-    sequence: JointSequence,
-    gap: JointQuery,
-    ask: Callable[[JointQuery], list[JointMapMessage]],
+    sequence: JointSequence, ask: Callable[[JointQuery], list[JointMapMessage]]
 ) -> Iterator[JointMap]:
-    for message in ask(gap):
-        sequence.offer(message)
-    filled = sequence.take()
-    if filled is None:
-        skipped = sequence.give_up()
-        if skipped:
-            _log.warning("%d versions of the joint map are lost", skipped)
-    else:
+    """Yield what is missing as long as it comes."""
+    while (gap := sequence.gap) is not None:
+        for message in ask(gap):
+            sequence.offer(message)
+        filled = sequence.take()
+        if filled is None:
+            skipped = sequence.give_up()
+            if skipped:
+                _log.warning("%d versions of the joint map are lost", skipped)
+            yield from iter(sequence.take, None)
+            return
         yield filled
-    yield from iter(sequence.take, None)
+        yield from iter(sequence.take, None)
 
 
 def _ask(session: zenoh.Session, team: str, query: JointQuery) -> list[JointMapMessage]:

@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from mapweave.maps import JointMap, RobotMap, component_name
+from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.narration.story_alignments import AlignmentStory
 from mapweave_protocol.narration.story_joint import JointStory
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
+from mapweave_protocol.wire.pairs import is_earlier_run
 
 
 @dataclass
@@ -15,8 +17,8 @@ class RobotState:
 
     Attributes
     ----------
-    boot
-        Of the run that is alive, None if none is.
+    claimants
+        The runs of it that are alive: one, where nothing is wrong.
     map
         Its last map.
     told
@@ -25,11 +27,16 @@ class RobotState:
         The names of all components that the run of `map` has had.
     """
 
-    boot: str | None = None
+    claimants: Claimants = field(default_factory=Claimants)
     status: StatusMessage | None = None
     map: RobotMap | None = None
     told: int = 0
     parts: set[str] = field(default_factory=set)
+
+    @property
+    def here(self) -> bool:
+        """Whether a run of it is alive."""
+        return bool(self.claimants.boots)
 
     @property
     def progress(self) -> str:
@@ -57,6 +64,7 @@ class Story:
         self.robots: dict[str, RobotState] = {}
         self._alignments = AlignmentStory()
         self._joint = JointStory()
+        self._coordinators = Claimants()
 
     @property
     def joint(self) -> JointMap | None:
@@ -64,18 +72,28 @@ class Story:
         return self._joint.joint
 
     def appeared(self, robot: str, boot: str) -> Iterator[str]:
-        """Tell that a run of a robot began."""
+        """Tell that a run of a robot began, and if it is not the only one."""
         state = self._robot(robot)
-        if state.boot != boot:
-            state.boot = boot
+        before = state.here
+        count = state.claimants.take(boot, here=True)
+        if count:
+            yield tell_robots(robot, count)
+        elif not before:
             yield f"{robot} is here"
 
     def left(self, robot: str, boot: str) -> Iterator[str]:
         """Tell that a run of a robot ended."""
         state = self._robot(robot)
-        if state.boot == boot:
-            state.boot = None
+        before = state.here
+        state.claimants.take(boot, here=False)
+        if before and not state.here:
             yield f"{robot} is gone"
+
+    def coordinator(self, boot: str, *, here: bool) -> Iterator[str]:
+        """Tell when a team has more than one coordinator."""
+        count = self._coordinators.take(boot, here=here)
+        if count:
+            yield tell_coordinators(count)
 
     def status(self, message: StatusMessage) -> Iterator[str]:
         """Tell when a robot has finished mapping."""
@@ -88,6 +106,8 @@ class Story:
     def mapped(self, robot_map: RobotMap) -> Iterator[str]:
         """Tell that a robot lost its way or found it, and when its map is twice what was told."""
         state = self._robot(robot_map.robot)
+        if state.map is not None and is_earlier_run(robot_map, state.map):
+            return
         before, state.map = state.map, robot_map
         if before is not None and before.boot == robot_map.boot:
             yield from _tell_lost(before, robot_map)

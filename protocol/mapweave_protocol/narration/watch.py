@@ -27,13 +27,21 @@ from mapweave_protocol.link.inbox import (
     alignment_reader,
     joint_reader,
     map_reader,
+    read_coordinator,
     read_presence,
     status_reader,
 )
 from mapweave_protocol.link.session import declare_subscriber, open_session
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.narration.story_joint import tell_components
-from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, LIVE, MAP, STATUS
+from mapweave_protocol.wire.keys import (
+    ALIGNMENT,
+    COORDINATOR_LIVE,
+    JOINT_MAP,
+    LIVE,
+    MAP,
+    STATUS,
+)
 from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.queries import JointQuery
@@ -79,7 +87,10 @@ class Watcher:
             yield from self.story.mapped(robot_map)
 
     def _tell_presence(self, arrival: Arrival) -> Iterator[str]:
-        presence = read_presence(arrival)
+        presence, coordinator = read_presence(arrival), read_coordinator(arrival)
+        if coordinator is not None:
+            boot, here = coordinator
+            yield from self.story.coordinator(boot, here=here)
         if presence is not None:
             change = self.story.appeared if presence.here else self.story.left
             yield from change(presence.robot, presence.boot)
@@ -119,15 +130,16 @@ def _subscribe(session: zenoh.Session, team: str, inbox: Inbox, stack: ExitStack
     for keys, history in HISTORY.items():
         key = keys.pattern(team=team)
         stack.enter_context(declare_subscriber(session, key, inbox.put, history=history))
-    live = LIVE.pattern(team=team)
-    stack.enter_context(session.liveliness().declare_subscriber(live, inbox.put, history=True))
+    for live in (LIVE, COORDINATOR_LIVE):
+        key = live.pattern(team=team)
+        stack.enter_context(session.liveliness().declare_subscriber(key, inbox.put, history=True))
 
 
 def _show(story: Story, lines: Sequence[str]) -> Group:
     """Return the robots as a table, who is together, and the last lines of the story."""
     table = Table("robot", "", "progress", "submaps", "segments", box=None)
     for robot, state in sorted(story.robots.items()):
-        here = "[green]here[/]" if state.boot else "[red]gone[/]"
+        here = "[green]here[/]" if state.here else "[red]gone[/]"
         table.add_row(robot, here, state.progress, str(state.submaps), str(state.segments))
     joint = story.joint
     together = f"joint map {joint.version}: {tell_components(joint)}" if joint else ""

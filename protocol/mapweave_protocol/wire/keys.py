@@ -1,6 +1,7 @@
 """Every key, built and parsed in one place from one format string each.
 
-``@v1`` names the version of this layout: keys of different versions never match each other.
+``v2`` names the version of this layout: keys of different versions never match each other. No part
+of a key may begin with ``@``: Zenoh keeps such parts out of what it sends again after an outage.
 """
 
 import re
@@ -72,14 +73,28 @@ class KeyFormat:
         return re.compile(self.text.format(**groups))
 
 
-MAP = KeyFormat("mapweave/@v1/{team}/agent/{robot}/map")
-STATUS = KeyFormat("mapweave/@v1/{team}/agent/{robot}/status")
-ALIGNMENT = KeyFormat("mapweave/@v1/{team}/agent/{robot}/alignment/{reference}/{other}")
-JOINT_MAP = KeyFormat("mapweave/@v1/{team}/joint/map")
-JOINT_QUERY = KeyFormat("mapweave/@v1/{team}/joint/query")
-LIVE = KeyFormat("mapweave/@v1/{team}/@live/{robot}/{boot}")
+MAP = KeyFormat("mapweave/v2/{team}/agent/{robot}/map")
+STATUS = KeyFormat("mapweave/v2/{team}/agent/{robot}/status")
+ALIGNMENT = KeyFormat("mapweave/v2/{team}/agent/{robot}/alignment/{reference}/{other}")
+JOINT_MAP = KeyFormat("mapweave/v2/{team}/joint/map")
+JOINT_QUERY = KeyFormat("mapweave/v2/{team}/joint/query")
+JOINT_STATUS = KeyFormat("mapweave/v2/{team}/joint/status")
+AGENT_QUERY = KeyFormat("mapweave/v2/{team}/agent/{robot}/query")
+COORDINATOR_LIVE = KeyFormat("mapweave/v2/{team}/live/coordinator/{boot}")
+LIVE = KeyFormat("mapweave/v2/{team}/live/agent/{robot}/{boot}")
+
+
+def everything(team: str) -> str:
+    """Return the key expression of all that a team publishes.
+
+    Raises
+    ------
+    InvalidIdError
+        If `team` is not an id.
+    """
+    return f"mapweave/v2/{check_id('team', team)}/**"
 
 
 def new_boot() -> str:
-    """Return a fresh name for this run of a robot."""
+    """Return a fresh name for this run of a robot, or this start of a coordinator."""
     return secrets.token_hex(6)

@@ -6,6 +6,7 @@ our own maps or from a stranger's bytes (`mapweave_protocol.wire.codec`).
 
 from mapweave_protocol.wire.alignment_message import AlignmentMessage, MapVersion
 from mapweave_protocol.wire.joint_message import JointMapMessage
+from mapweave_protocol.wire.joint_status_message import JointStatusMessage
 from mapweave_protocol.wire.map_message import MapMessage
 from mapweave_protocol.wire.status_message import Compared, StatusMessage, Traffic
 
@@ -13,6 +14,7 @@ __all__ = [
     "AlignmentMessage",
     "Compared",
     "JointMapMessage",
+    "JointStatusMessage",
     "MapMessage",
     "MapVersion",
     "StatusMessage",

@@ -1,7 +1,8 @@
 """The coordinator's queryable: what may be asked, as the parameters of a selector.
 
 Replies, one sample each, on the same key: to none and ``version=N`` a `JointMapMessage`, to
-``since=N`` one for every version after N in their order, to ``robot=ID`` a complete `MapMessage`.
+``since=N`` one for every version after N in their order (the first K with ``limit=K``), to
+``robot=ID`` a complete `MapMessage`.
 """
 
 import re
@@ -24,6 +25,8 @@ class JointQuery(BaseModel):
         The joint map of this number.
     since
         All joint maps of a higher number.
+    limit
+        No more of them than so many, those that come first.
     robot
         The last map of this robot, gone or not.
     """
@@ -32,12 +35,15 @@ class JointQuery(BaseModel):
 
     version: Count | None = Field(default=None)
     since: Count | None = Field(default=None)
+    limit: int | None = Field(default=None, ge=1, le=2**53)
     robot: Id | None = Field(default=None)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if len(self._given()) > 1:
+        if len(self._given().keys() - {"limit"}) > 1:
             raise ValueError("expected one of version, since and robot")
+        if self.limit is not None and self.since is None:
+            raise ValueError("limit, expected beside since only")
         return self
 
     @property
@@ -62,7 +68,7 @@ class JointQuery(BaseModel):
         try:
             return cls.model_validate(values)
         except ValueError as error:
-            expected = "expected one of version=N, since=N, robot=ID, or nothing"
+            expected = "expected one of version=N, since=N, since=N;limit=K, robot=ID, or nothing"
             raise MessageError("query", f"{parameters[:80]!r}: {expected}") from error
 
     def _given(self) -> dict[str, int | str]:

@@ -4,6 +4,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from mapweave_protocol.wire.alignment_message import MapVersion
 from mapweave_protocol.wire.model import Count, Id, Label, Message, Number, WireModel
 
 MAX_PEERS = 1024
@@ -35,6 +36,8 @@ class StatusMessage(Message):
         How many scans there are to come in all, where known.
     compared
         By peer, for the pairs this robot compared.
+    holds
+        Which state of each peer's map is held.
     sent
         By kind of message: ``map``, ``alignment``, ``status``.
     """
@@ -52,4 +55,5 @@ class StatusMessage(Message):
     submaps: Count
     map_version: Count
     compared: dict[Id, Compared] = Field(default_factory=dict, max_length=MAX_PEERS)
+    holds: tuple[MapVersion, ...] = Field(default=(), max_length=MAX_PEERS)
     sent: dict[Label, Traffic] = Field(default_factory=dict, max_length=16)

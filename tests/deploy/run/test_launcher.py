@@ -30,7 +30,7 @@ def test_agents_and_coordinator_get_the_configuration_of_the_team(
     member = Member(
         "r1", Path("log"), (0, 9), "here", np.empty(0, dtype=np.int64), np.empty((0, 3))
     )
-    plan = Plan("t", [member], "max", "tcp/127.0.0.1:1", tmp_path / "store", None, config)
+    plan = Plan("t", [member], "max", "tcp/127.0.0.1:1", tmp_path / "store", tmp_path, None, config)
     crew = Noted(tmp_path)
     start_server(crew, plan, plan.store)
     start_agent(crew, plan, member)

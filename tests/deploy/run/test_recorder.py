@@ -83,5 +83,5 @@ def test_messages_and_bytes_are_counted_by_robot_and_kind() -> None:
 @pytest.mark.parametrize("end", ["R1/map", "R1/status", "r1/alignment/R1/r2"])
 def test_a_key_with_an_invalid_id_is_of_no_robot(end: str) -> None:
     recorder = Recorder()
-    assert list(recorder.take(Arrival(f"mapweave/@v1/t/agent/{end}", b"junk"))) == []
+    assert list(recorder.take(Arrival(f"mapweave/v2/t/agent/{end}", b"junk"))) == []
     assert not recorder.traffic

@@ -7,7 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
-from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler, MapSender
+from mapweave_protocol.link.assembler import (
+    MESSAGES_TO_COMPLETE,
+    REMEMBERED_BOOTS,
+    MapAssembler,
+    MapSender,
+)
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.messages import MapMessage
 
@@ -168,16 +173,27 @@ def test_a_large_map_is_repeated_after_so_many_messages_however_little_changes()
     assert whole == [0, MESSAGES_TO_COMPLETE]
 
 
-def test_another_run_of_a_robot_starts_from_nothing_and_the_old_one_stays_past(
+def test_another_run_of_a_robot_starts_from_nothing_and_the_old_one_goes_on(
     random_map: MakeMap,
 ) -> None:
-    old = MapMessage.pack(random_map(1, version=50))
-    new = MapMessage.pack(random_map(2, boot="b2", version=1))
+    maps = [
+        random_map(1, version=50),
+        random_map(2, boot="b2", version=1),
+        random_map(3, version=51),
+    ]
     assembler = MapAssembler()
-    assert assembler.update(old) is not None
-    arrived = assembler.update(new)
-    assert arrived is not None and arrived.boot == "b2"
-    assert assembler.update(MapMessage.pack(random_map(3, version=51))) is None
+    for robot_map in maps:
+        arrived = assembler.update(MapMessage.pack(robot_map))
+        assert arrived is not None and same(arrived, robot_map)
+    assert assembler.update(MapMessage.pack(maps[0])) is None
+
+
+def test_of_too_many_runs_the_one_unheard_for_longest_is_forgotten(random_map: MakeMap) -> None:
+    maps = [random_map(1, boot=f"b{number}") for number in range(REMEMBERED_BOOTS + 1)]
+    assembler = MapAssembler()
+    arrived = [assembler.update(MapMessage.pack(robot_map)) for robot_map in [*maps, *maps[:2]]]
+    assert [robot_map is not None for robot_map in arrived] == [True] * len(maps) + [True, True]
+    assert assembler.update(MapMessage.pack(maps[-1])) is None
 
 
 def test_robots_do_not_mix(random_map: MakeMap) -> None:

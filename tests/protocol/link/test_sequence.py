@@ -4,8 +4,15 @@ from hypothesis import strategies as st
 
 from mapweave.errors import MapweaveError
 from mapweave.maps import JointMap
-from mapweave_protocol.link.sequence import MAX_TRIES, MAX_WAITING, JointSequence
+from mapweave_protocol.link.sequence import (
+    ASKED_AT_ONCE,
+    MAX_TRIES,
+    MAX_WAITING,
+    SHORT_HISTORY,
+    JointSequence,
+)
 from mapweave_protocol.wire.messages import JointMapMessage
+from mapweave_protocol.wire.model import MAX_COUNT
 from mapweave_protocol.wire.queries import JointQuery
 
 
@@ -18,10 +25,20 @@ def taken(sequence: JointSequence) -> list[int]:
 
 
 def ask_the_store(sequence: JointSequence, store: range) -> None:
-    if sequence.gap is not None and sequence.gap.since is not None:
-        for version in store:
-            if version > sequence.gap.since:
-                sequence.offer(message(version))
+    gap = sequence.gap
+    if gap is not None:
+        since = store[-2] if gap.since is None else gap.since
+        wanted = [version for version in store if version > since]
+        for version in wanted[: gap.limit]:
+            sequence.offer(message(version))
+
+
+def delivered_until_quiet(sequence: JointSequence, store: range) -> list[int]:
+    delivered = taken(sequence)
+    while sequence.gap is not None:
+        ask_the_store(sequence, store)
+        delivered += taken(sequence)
+    return delivered
 
 
 @given(st.permutations(range(1, 12)), st.lists(st.integers(1, 11), max_size=8))
@@ -29,7 +46,7 @@ def ask_the_store(sequence: JointSequence, store: range) -> None:
 def test_any_order_with_repetitions_is_delivered_in_order_without_gap(
     order: list[int], again: list[int]
 ) -> None:
-    sequence = JointSequence(from_the_first=True)
+    sequence = JointSequence(whole_up_to=MAX_COUNT)
     delivered = []
     for version in [*order, *again]:
         sequence.offer(message(version))
@@ -40,7 +57,7 @@ def test_any_order_with_repetitions_is_delivered_in_order_without_gap(
 @given(st.lists(st.integers(1, 30), min_size=1, unique=True).map(sorted))
 @settings(deadline=None)
 def test_what_is_lost_is_asked_for(heard: list[int]) -> None:
-    sequence = JointSequence(from_the_first=True)
+    sequence = JointSequence(whole_up_to=MAX_COUNT)
     delivered = []
     for version in heard:
         sequence.offer(message(version))
@@ -52,14 +69,57 @@ def test_what_is_lost_is_asked_for(heard: list[int]) -> None:
 
 
 def test_who_comes_late_starts_with_the_latest() -> None:
-    sequence = JointSequence(from_the_first=False)
+    sequence = JointSequence(whole_up_to=0)
     for version in (7, 6, 8):
         sequence.offer(message(version))
     assert taken(sequence) == [7, 8]
 
 
+def test_who_was_there_before_a_long_history_gets_the_latest_of_it_and_goes_on() -> None:
+    sequence = JointSequence(whole_up_to=SHORT_HISTORY)
+    delivered = []
+    for version in (300, 301, 304):
+        sequence.offer(message(version))
+        delivered += delivered_until_quiet(sequence, range(1, version + 1))
+    assert delivered == [300, 301, 302, 303, 304]
+
+
+def test_of_a_short_history_who_was_there_before_gets_all() -> None:
+    sequence = JointSequence(whole_up_to=SHORT_HISTORY)
+    sequence.offer(message(SHORT_HISTORY))
+    delivered = delivered_until_quiet(sequence, range(1, SHORT_HISTORY + 1))
+    assert delivered == list(range(1, SHORT_HISTORY + 1))
+
+
+def test_who_slept_through_two_thousand_versions_gets_all_in_order_in_portions() -> None:
+    sequence = JointSequence(whole_up_to=0)
+    sequence.offer(message(1))
+    for version in (500, *range(1900, 2001)):
+        sequence.offer(message(version))
+    assert taken(sequence) == [1]
+    assert sequence.gap == JointQuery(since=1, limit=ASKED_AT_ONCE)
+    assert delivered_until_quiet(sequence, range(1, 2001)) == list(range(2, 2001))
+
+
+def test_a_version_that_is_only_told_of_is_asked_for() -> None:
+    sequence = JointSequence(whole_up_to=0)
+    sequence.expect("s1", 7)
+    assert sequence.gap == JointQuery()
+    assert delivered_until_quiet(sequence, range(1, 8)) == [7]
+    sequence.expect("s1", 8)
+    assert delivered_until_quiet(sequence, range(1, 9)) == [8]
+
+
+def test_what_is_told_of_another_series_is_not_asked_for() -> None:
+    sequence = JointSequence(whole_up_to=0)
+    sequence.offer(message(7))
+    assert taken(sequence) == [7]
+    sequence.expect("s2", 9)
+    assert sequence.gap is None
+
+
 def test_a_gap_that_nobody_can_close_is_skipped_after_some_tries() -> None:
-    sequence = JointSequence(from_the_first=True)
+    sequence = JointSequence(whole_up_to=MAX_COUNT)
     sequence.offer(message(5))
     skipped = [sequence.give_up() for _ in range(MAX_TRIES)]
     assert skipped == [0] * (MAX_TRIES - 1) + [4]
@@ -67,14 +127,14 @@ def test_a_gap_that_nobody_can_close_is_skipped_after_some_tries() -> None:
 
 
 def test_another_store_counts_from_one_again_and_the_old_one_is_not_heard_any_more() -> None:
-    sequence = JointSequence(from_the_first=False)
+    sequence = JointSequence(whole_up_to=0)
     for new in (message(9), message(1, "s2"), message(10), message(2, "s2")):
         sequence.offer(new)
     assert taken(sequence) == [1, 2]
 
 
 def test_no_more_than_so_many_wait() -> None:
-    sequence = JointSequence(from_the_first=True)
+    sequence = JointSequence(whole_up_to=MAX_COUNT)
     for version in range(2, 3 * MAX_WAITING):
         sequence.offer(message(version))
     sequence.offer(message(1))
@@ -82,7 +142,14 @@ def test_no_more_than_so_many_wait() -> None:
 
 
 @pytest.mark.parametrize(
-    "query", [JointQuery(), JointQuery(version=3), JointQuery(since=0), JointQuery(robot="r1")]
+    "query",
+    [
+        JointQuery(),
+        JointQuery(version=3),
+        JointQuery(since=0),
+        JointQuery(since=3, limit=2),
+        JointQuery(robot="r1"),
+    ],
 )
 def test_parsing_undoes_what_a_query_says(query: JointQuery) -> None:
     assert JointQuery.parse(query.parameters) == query
@@ -101,6 +168,9 @@ def test_any_other_parameters_are_refused(parameters: str) -> None:
     "parameters",
     [
         "version=1;since=2",
+        "limit=2",
+        "since=1;limit=0",
+        "version=1;limit=2",
         "version=-1",
         "version=x",
         "robot=A",

@@ -26,7 +26,7 @@ from mapweave_protocol.link.session import (
 )
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
+from mapweave_protocol.wire.messages import JointMapMessage, JointStatusMessage, MapMessage
 from mapweave_protocol.wire.queries import JointQuery
 
 MakeMap = Callable[..., RobotMap]
@@ -45,6 +45,8 @@ class Coordinator:
 
     def __init__(self, session: zenoh.Session, team: str) -> None:
         self.answered = 0
+        self._session = session
+        self._team = team
         self._remembered: dict[int, bytes] = {}
         self._key = keys.JOINT_QUERY.build(team=team)
         key = keys.JOINT_MAP.build(team=team)
@@ -57,6 +59,10 @@ class Coordinator:
         self._remembered[version] = payload
         if publish:
             self._publisher.put(payload)
+
+    def say(self, status: JointStatusMessage) -> None:
+        """Say how far it is."""
+        self._session.put(keys.JOINT_STATUS.build(team=self._team), encode(status))
 
     def is_heard(self) -> bool:
         """Tell whether anybody subscribes to the joint map."""
@@ -111,6 +117,21 @@ def test_who_listens_from_the_start_gets_every_version_also_those_that_were_lost
         for version in range(1, 7):
             coordinator.add(version, publish=version not in (1, 4))
         assert heard.result(PATIENCE) == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_version_that_never_arrived_is_asked_for_when_the_coordinator_tells_of_it(
+    endpoint: str, team: str
+) -> None:
+    said = JointStatusMessage(boot="c", stamp=0.0, series="s1", version=2, pending=False)
+    with coordinating(endpoint, team) as coordinator, ThreadPoolExecutor() as pool:
+        coordinator.add(1)
+        heard = pool.submit(versions, endpoint, team, 2)
+        wait_for(lambda: coordinator.answered > 0)
+        coordinator.add(2, publish=False)
+        while not heard.done():
+            coordinator.say(said)
+            time.sleep(0.1)
+        assert heard.result() == [1, 2]
 
 
 def test_who_listens_before_there_is_a_coordinator_misses_nothing(endpoint: str, team: str) -> None:

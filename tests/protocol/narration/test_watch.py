@@ -65,10 +65,20 @@ def test_a_robot_that_comes_and_goes_is_told_once_each() -> None:
     assert lines == ["a is here", "a is gone"]
 
 
-def test_a_run_that_another_one_followed_may_go_untold() -> None:
+def test_two_that_claim_one_id_are_told_and_that_one_is_left_is_not() -> None:
     story = Story()
     lines = [*story.appeared("a", "b1"), *story.appeared("a", "b2"), *story.left("a", "b1")]
-    assert lines == ["a is here", "a is here"]
+    two = "2 agents call themselves a: expected one; give each robot an id of its own"
+    assert lines == ["a is here", two]
+    assert story.robots["a"].here
+
+
+def test_a_second_coordinator_is_told_once() -> None:
+    watcher = Watcher()
+    tokens = [keys.COORDINATOR_LIVE.build(team="t", boot=boot) for boot in ("x", "y", "y")]
+    lines = [line for key in tokens for line in watcher.tell(Arrival(key, b""))]
+    two = "2 coordinators of the team are here, each with its own joint map: expected one"
+    assert lines == [two]
 
 
 def test_a_decision_is_told_when_it_is_new_with_confidence_and_reason() -> None:
@@ -124,7 +134,12 @@ def test_a_join_that_a_version_does_not_rely_on_is_told_once_with_the_reason() -
 
 def test_what_is_no_message_is_not_told() -> None:
     watcher = Watcher()
-    for key in (keys.MAP.build(team="t", robot="a"), "mapweave/@v1/t/@live/NO ID/1", "elsewhere"):
+    for key in (
+        keys.MAP.build(team="t", robot="a"),
+        "mapweave/v2/t/live/agent/NO ID/1",
+        "mapweave/v2/t/live/coordinator/NO ID",
+        "elsewhere",
+    ):
         assert list(watcher.tell(Arrival(key, b"junk"))) == []
 
 

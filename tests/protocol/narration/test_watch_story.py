@@ -92,6 +92,13 @@ def test_another_run_of_a_robot_has_not_lost_the_way_of_the_one_before() -> None
     assert lines == ["a: 3 submaps in 2 components, 0 segments", "a: 1 submap, 0 segments"]
 
 
+def test_the_map_of_an_earlier_run_does_not_replace_that_of_the_later() -> None:
+    story = Story()
+    maps = [robot_map(1, 1, boot="z"), robot_map(0)]
+    assert [list(story.mapped(map_)) for map_ in maps] == [["a: 2 submaps, 0 segments"], []]
+    assert story.robots["a"].submaps == 2
+
+
 def test_a_growing_map_is_told_whenever_it_has_doubled() -> None:
     story = Story()
     lines = [line for count in range(1, 20) for line in story.mapped(robot_map(*[0] * count))]

@@ -19,6 +19,7 @@ from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     Compared,
     JointMapMessage,
+    JointStatusMessage,
     MapMessage,
     MapVersion,
     StatusMessage,
@@ -65,8 +66,17 @@ def status() -> StatusMessage:
         submaps=2,
         map_version=3,
         compared=compared,
+        holds=(MapVersion(robot="b", boot="x", version=7),),
         sent={"map": Traffic(messages=2, bytes=999)},
     )
+
+
+def joint_status() -> JointStatusMessage:
+    a, b = (MapVersion(robot=robot, boot="x", version=3) for robot in "ab")
+    return JointStatusMessage(
+        boot="c", stamp=1.7e9, series="s1", version=2, pending=True, maps=(a, b),
+        alignments=((a, b),),
+    )  # fmt: skip
 
 
 def alignments(*found: Alignment) -> AlignmentMessage:
@@ -76,7 +86,7 @@ def alignments(*found: Alignment) -> AlignmentMessage:
 
 def messages(make_map: MakeMap, make_joint: MakeJoint) -> list[Message]:
     joint = JointMapMessage.pack(make_joint(3), series="s1")
-    return [MapMessage.pack(make_map(1)), joint, status(), alignments()]
+    return [MapMessage.pack(make_map(1)), joint, status(), joint_status(), alignments()]
 
 
 @given(SEEDS)
@@ -230,6 +240,7 @@ def test_what_could_not_be_measured_is_left_out() -> None:
 
 def test_a_status_arrives_as_it_was_sent() -> None:
     assert decode(StatusMessage, encode(status())) == status()
+    assert decode(JointStatusMessage, encode(joint_status())) == joint_status()
 
 
 def test_a_segment_costs_few_bytes(random_map: MakeMap) -> None:
@@ -253,7 +264,9 @@ def accepts_or_refuses(kind: type[Message], payload: bytes) -> None:
 
 @given(st.binary(max_size=300))
 def test_random_bytes_are_refused(payload: bytes) -> None:
-    for kind in (MapMessage, JointMapMessage, StatusMessage, AlignmentMessage):
+    for kind in (
+        MapMessage, JointMapMessage, StatusMessage, JointStatusMessage, AlignmentMessage,
+    ):  # fmt: skip
         with pytest.raises(MessageError):
             decode(kind, payload)
 

@@ -7,7 +7,10 @@ from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.keys import KeyFormat
 from mapweave_protocol.wire.pairs import ordered, responsible
 
-FORMATS = [keys.MAP, keys.STATUS, keys.ALIGNMENT, keys.JOINT_MAP, keys.JOINT_QUERY, keys.LIVE]
+FORMATS = [
+    keys.MAP, keys.STATUS, keys.ALIGNMENT, keys.AGENT_QUERY, keys.JOINT_MAP, keys.JOINT_STATUS,
+    keys.JOINT_QUERY, keys.LIVE, keys.COORDINATOR_LIVE,
+]  # fmt: skip
 EXAMPLE = {"team": "rescue", "robot": "r1", "reference": "r1", "other": "r2", "boot": "0af3"}
 
 
@@ -22,9 +25,24 @@ def test_parsing_undoes_building(keys_of: KeyFormat) -> None:
 
 def test_keys_are_those_of_the_design() -> None:
     assert keys.ALIGNMENT.build(**parts_of(keys.ALIGNMENT)) == (
-        "mapweave/@v1/rescue/agent/r1/alignment/r1/r2"
+        "mapweave/v2/rescue/agent/r1/alignment/r1/r2"
     )
-    assert keys.LIVE.build(team="rescue", robot="r1", boot="7") == "mapweave/@v1/rescue/@live/r1/7"
+    assert (
+        keys.LIVE.build(team="rescue", robot="r1", boot="7") == "mapweave/v2/rescue/live/agent/r1/7"
+    )
+
+
+@pytest.mark.parametrize("keys_of", FORMATS)
+def test_no_part_of_a_key_begins_with_an_at_sign(keys_of: KeyFormat) -> None:
+    # Zenoh would not bring what was published during an outage.
+    assert not any(part.startswith("@") for part in keys_of.build(**parts_of(keys_of)).split("/"))
+
+
+@pytest.mark.parametrize("keys_of", FORMATS)
+def test_everything_of_a_team_is_published_below_its_key(keys_of: KeyFormat) -> None:
+    key = zenoh.KeyExpr(keys_of.build(**parts_of(keys_of)))
+    assert zenoh.KeyExpr(keys.everything("rescue")).includes(key)
+    assert not zenoh.KeyExpr(keys.everything("others")).intersects(key)
 
 
 @pytest.mark.parametrize("keys_of", FORMATS)
@@ -53,9 +71,9 @@ def test_a_name_that_is_no_id_makes_no_key(name: str) -> None:
     "key",
     [
         "",
-        "mapweave/@v1/t/agent/r/map/",
-        "mapweave/@v1/t/agent/r/more/map",
-        "mapweave/@v2/t/agent/r/map",
+        "mapweave/v2/t/agent/r/map/",
+        "mapweave/v2/t/agent/r/more/map",
+        "mapweave/@v1/t/agent/r/map",
         "x/mapweave",
     ],
 )
@@ -67,7 +85,7 @@ def test_a_foreign_key_is_refused(key: str) -> None:
 
 def test_a_key_with_a_part_that_is_no_id_is_refused() -> None:
     with pytest.raises(InvalidIdError):
-        keys.MAP.parse("mapweave/@v1/t/agent/R 1/map")
+        keys.MAP.parse("mapweave/v2/t/agent/R 1/map")
 
 
 def test_both_of_a_pair_name_the_same_one_responsible_and_order() -> None:

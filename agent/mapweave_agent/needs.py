@@ -1,0 +1,107 @@
+"""What others lack of what this robot has published: they say what they hold, it compares.
+
+No clock and no network in here.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from mapweave_protocol.link.lacking import Lacking
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    JointStatusMessage,
+    MapVersion,
+    StatusMessage,
+)
+from mapweave_protocol.wire.pairs import is_older, states_of
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """What is to be sent again: the whole map, those of past runs, and alignments."""
+
+    map: bool = False
+    past: tuple[MapVersion, ...] = ()
+    alignments: tuple[AlignmentMessage, ...] = ()
+
+
+class Needs:
+    """Takes in what others say they hold; says what to send again.
+
+    Parameters
+    ----------
+    robot
+        Whose maps and alignments it is about.
+    """
+
+    def __init__(self, robot: str) -> None:
+        self._robot = robot
+        self._lacking = Lacking()
+        self._coordinators: dict[str, JointStatusMessage] = {}
+        self._peers: dict[str, StatusMessage] = {}
+
+    def coordinator(self, status: JointStatusMessage) -> None:
+        """Take in what a coordinator holds."""
+        self._coordinators[status.boot] = status
+
+    def peer(self, status: StatusMessage) -> None:
+        """Take in what another robot holds."""
+        self._peers[status.boot] = status
+
+    def missing(
+        self,
+        own: MapVersion | None,
+        found: Iterable[AlignmentMessage],
+        now: float,
+        past: Iterable[MapVersion] = (),
+    ) -> Missing:
+        """Return what those lack who have spoken since the last time.
+
+        Parameters
+        ----------
+        own
+            The state of this robot's map as published, None while there is none.
+        found
+            What this robot has published of each pair, the last of each.
+        now
+            [s] by any clock.
+        past
+            The maps of this robot's earlier runs, which coordinators should hold.
+        """
+        coordinators = {f"coordinator {b}": s.maps for b, s in self._coordinators.items()}
+        held = coordinators | {f"{s.robot} {b}": s.holds for b, s in self._peers.items()}
+        # All are asked, so that each one's time runs.
+        lacks = [own is not None and self._lacks_map(who, m, own, now) for who, m in held.items()]
+        missing = tuple(message for message in found if self._lacks_alignments(message, now))
+        wanted = [
+            run
+            for run in past
+            for who, m in coordinators.items()
+            if self._lacks_map(f"{who} {run.boot}", m, run, now)
+        ]
+        self._coordinators.clear()
+        self._peers.clear()
+        return Missing(any(lacks), tuple(dict.fromkeys(wanted)), missing)
+
+    def _lacks_map(self, who: str, held: Sequence[MapVersion], own: MapVersion, now: float) -> bool:
+        mine = [version for version in held if version.robot == self._robot]
+        newest = next((v.version for v in mine if v.boot == own.boot), None)
+        lacks = newest is None or newest < own.version
+        return self._lacking.due(f"map {who}", newest, now, lacks=lacks)
+
+    def _lacks_alignments(self, message: AlignmentMessage, now: float) -> bool:
+        ours = message.reference, message.other
+        pair = " ".join(f"{end.robot}@{end.boot}" for end in ours)
+        due = False
+        for boot, status in self._coordinators.items():
+            held = _held_of_pair(status, ours)
+            lacks = held is None or is_older(held, ours)
+            due |= self._lacking.due(f"alignments {boot} {pair}", held, now, lacks=lacks)
+        return due
+
+
+def _held_of_pair(
+    status: JointStatusMessage, ours: tuple[MapVersion, MapVersion]
+) -> tuple[MapVersion, MapVersion] | None:
+    runs = states_of(ours).keys()
+    return next((ends for ends in status.alignments if states_of(ends).keys() == runs), None)

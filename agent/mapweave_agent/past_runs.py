@@ -1,0 +1,123 @@
+"""A robot's runs on disk, one file each: what a restarted agent numbers on from, and delivers.
+
+A file holds the whole map of a run, as the message that travels.
+"""
+
+import logging
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mapweave.atomic import replace_file
+from mapweave.errors import FileError
+from mapweave.maps import RobotMap
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.assembler import MapAssembler, MapSender
+from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.messages import MapMessage, MapVersion
+
+SUFFIX = ".map"
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PastRun:
+    """A run that is over.
+
+    Attributes
+    ----------
+    map
+        What it mapped.
+    payload
+        The same, as its message.
+    age
+        How long ago it was written [s].
+    """
+
+    map: RobotMap
+    payload: bytes
+    age: float
+
+    @property
+    def state(self) -> MapVersion:
+        """Which state of the map it is."""
+        return MapVersion.of(self.map)
+
+
+class StateFolder:
+    """The folder of a robot's runs; made where it is missing.
+
+    Raises
+    ------
+    FileError
+        If it cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._sender = MapSender()
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(path, f"cannot be made a folder ({error.strerror})") from error
+
+    def keep(self, robot_map: RobotMap) -> None:
+        """Keep the map of a run in place of the last one of that run.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        payload = self._sender.payload(robot_map, complete=True)
+        with replace_file(self.path / f"{robot_map.boot}{SUFFIX}") as new:
+            new.write_bytes(payload)
+
+    def runs(self, robot: str, now: float) -> list[PastRun]:
+        """Return the runs of `robot`, the earliest first; `now` [s since 1970].
+
+        A file that is none is told and left where it is: it must not keep a robot from its work.
+        """
+        found = [self._read(path, robot, now) for path in sorted(self.path.glob(f"[!.]*{SUFFIX}"))]
+        runs = [run for run in found if run is not None and run.map.submaps]
+        return sorted(runs, key=lambda run: max(run.map.components))
+
+    def _read(self, path: Path, robot: str, now: float) -> PastRun | None:
+        payload = path.read_bytes()
+        try:
+            message = decode(MapMessage, payload)
+        except MessageError as error:
+            _log.warning("%s: passed over, %s", path, error)
+            return None
+        robot_map = MapAssembler().update(message)
+        if robot_map is None or robot_map.robot != robot:
+            _log.warning("%s: passed over, no whole map of %s", path, robot)
+            return None
+        return PastRun(robot_map, payload, now - path.stat().st_mtime)
+
+
+def default_folder(team: str, robot: str, environment: Mapping[str, str] = os.environ) -> Path:
+    """Return where the runs of a robot are kept unless it is told."""
+    home = environment.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
+    return Path(home) / "mapweave" / team / robot
+
+
+def first_component(maps: Iterable[RobotMap]) -> int:
+    """Return the first number above the components of all `maps`."""
+    return max((max(m.components, default=-1) for m in maps), default=-1) + 1
+
+
+def numbered_from(robot_map: RobotMap, first: int) -> RobotMap:
+    """Return `robot_map` with its components counted from `first` instead of 0."""
+    submaps = (replace(s, component=first + s.component) for s in robot_map.submaps)
+    return replace(robot_map, submaps=tuple(submaps)) if first else robot_map
+
+
+def young_enough(runs: Sequence[PastRun], within: float) -> list[PastRun]:
+    """Return the runs that ended less than `within` [s] ago; tell of the others."""
+    old = [run for run in runs if run.age >= within]
+    if old:
+        _log.info("earlier runs kept, but not sent, as they are too old: %d", len(old))
+    return [run for run in runs if run.age < within]
