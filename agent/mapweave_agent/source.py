@@ -44,12 +44,15 @@ class LogSource:
         How many scans are selected.
     angular_step
         Between beams [rad], where the log does not state it; None has their number tell.
+    topic
+        Of a bag: the laser's; None takes the only one there is.
     """
 
     path: Path
     selected: ScanRange
     total: int
     angular_step: float | None = None
+    topic: str | None = None
 
     @classmethod
     def open(
@@ -58,6 +61,7 @@ class LogSource:
         selected: ScanRange,
         on_warning: Callable[[str], None],
         angular_step: float | None = None,
+        topic: str | None = None,
     ) -> "LogSource":
         """Read the log through once, so that what is wrong with it is said before all else.
 
@@ -66,17 +70,21 @@ class LogSource:
         FileError
             If it holds no usable scan, or none that is selected.
         """
-        read = read_scans(path, angular_step=angular_step, on_warning=on_warning)
+        read = read_scans(path, angular_step=angular_step, topic=topic, on_warning=on_warning)
         scans = sum(1 for _ in read)
         total = selected.count(scans)
         if total == 0:
             raise FileError(path, f"has {scans} scans, none of them in {selected}")
-        return cls(path, selected, total, angular_step)
+        return cls(path, selected, total, angular_step, topic)
 
     def scans(self) -> Iterator[Scan]:
         """Yield the selected scans, without odometry."""
-        step = self.angular_step
-        scans = read_scans(self.path, angular_step=step, on_warning=_already_warned)
+        scans = read_scans(
+            self.path,
+            angular_step=self.angular_step,
+            topic=self.topic,
+            on_warning=_already_warned,
+        )
         return self.selected.of(scans)
 
 

@@ -5,7 +5,13 @@ import sys
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
-from mapweave.cli import Command, add_config_argument, argument, config_of
+from mapweave.cli import (
+    Command,
+    add_config_argument,
+    add_topic_argument,
+    argument,
+    config_of,
+)
 from mapweave.commands.progress import track
 from mapweave.config import Config
 from mapweave.errors import FileError
@@ -19,7 +25,13 @@ from mapweave.pictures.picture import check_picture_suffix, plot
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("log", metavar="LOG", type=Path, help="CARMEN, TORO or g2o, may be gzipped")
+    parser.add_argument(
+        "log",
+        metavar="LOG",
+        type=Path,
+        help="CARMEN, TORO or g2o, may be gzipped; or a ROS bag, a file or a folder",
+    )
+    add_topic_argument(parser)
     parser.add_argument("--output", metavar="MAP.json", type=Path, help="the map file to write")
     parser.add_argument("--robot", metavar="ID", default="r1", help="the robot's id (%(default)s)")
     parser.add_argument(
@@ -60,10 +72,12 @@ def _map_log(options: argparse.Namespace, config: Config) -> tuple[RobotMap, int
     """Map the chosen scans; return the map and how many scans there were."""
     mapper = Mapper(options.robot, config=config)
     log, chosen, step = options.log, options.scans, config.sensor.angular_step
-    total = chosen.count(count_scans(log, step)) if sys.stderr.isatty() else None
+    topic = options.topic
+    total = chosen.count(count_scans(log, step, topic)) if sys.stderr.isatty() else None
     taken = 0
     prior = options.odometry == "prior"
-    scans = chosen.of(read_scans(log, odometry=prior, angular_step=step, on_warning=_warn))
+    read = read_scans(log, odometry=prior, angular_step=step, topic=topic, on_warning=_warn)
+    scans = chosen.of(read)
     for scan in track(scans, f"mapping {log.name}", total):
         mapper.add(scan)
         taken += 1
