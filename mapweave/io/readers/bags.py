@@ -26,13 +26,10 @@ from mapweave.scan.scan import Scan
 EXPECTED = "expected a ROS bag (.bag, .db3 or .mcap) with sensor_msgs/LaserScan"
 CUT_OFF = "is cut off or was not closed"
 _DAMAGE: tuple[type[Exception], ...] = (
-    *(ValueError, RuntimeError, OSError, EOFError, struct.error),  # unpacking
-    *(
-        AssertionError,
-        ArithmeticError,
-        TypeError,
-        LookupError,
-    ),  # rosbags, where a length or an id is wrong
+    # unpacking
+    *(ValueError, RuntimeError, OSError, EOFError, struct.error),
+    # rosbags, where a length or an id is wrong
+    *(AssertionError, ArithmeticError, MemoryError, TypeError, LookupError),
 )
 """What is raised for content that is damaged, beside the errors of `rosbags`' readers."""
 
