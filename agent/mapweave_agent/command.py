@@ -4,18 +4,27 @@ import argparse
 import logging
 import sys
 from functools import partial
-from pathlib import Path
 
-from mapweave.cli import Command, add_config_argument, argument, config_of, positive
+from mapweave.cli import (
+    Command,
+    add_config_argument,
+    add_topic_argument,
+    argument,
+    config_of,
+    positive,
+)
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
+from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
+from mapweave.io.sources import ScanSource, open_source
 from mapweave.mapping.mapper import Mapper, MapperParameters
-from mapweave_agent.agent import Agent
+from mapweave_agent.agent import AgentRun
 from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
+from mapweave_agent.live_scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
-from mapweave_agent.source import LogSource, ReplayClock, parse_rate
+from mapweave_agent.source import ReplayClock, count_selected, parse_rate, told_once
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
@@ -26,7 +35,17 @@ _log = logging.getLogger(__name__)
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", required=True, metavar="ID", help="the robot's id")
-    parser.add_argument("--log", required=True, type=Path, help="the laser log to play")
+    sources = parser.add_mutually_exclusive_group(required=True)
+    sources.add_argument(
+        "--source",
+        metavar="SOURCE",
+        help="where the scans come from: a log or a bag to play, - for lines of JSON on standard"
+        " input, or what an installed package brings",
+    )
+    sources.add_argument(
+        "--log", dest="source", metavar="LOG", help="the laser log to play, as --source"
+    )
+    add_topic_argument(parser)
     parser.add_argument(
         "--rate",
         type=argument(parse_rate),
@@ -59,9 +78,10 @@ def _run(options: argparse.Namespace) -> int:
     robot = check_id("robot", options.robot)
     team, endpoints = connection_of(options)
     config = config_of(options)
-    clock = ReplayClock(options.rate)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
-    source = LogSource.open(options.log, options.scans, _log.warning, config.sensor.angular_step)
+    step, warn = config.sensor.angular_step, told_once(_log.warning)
+    source = open_source(options.source, ReadOptions(False, step, options.topic, warn))
+    total = count_selected(options.source, source, options.scans)
 
     def tell_waiting() -> None:
         _log.info("waiting for a router at %s", ", ".join(endpoints))
@@ -75,9 +95,19 @@ def _run(options: argparse.Namespace) -> int:
     ):
         mapper = Mapper(robot, new_boot(), mapping, backend, config)
         parameters = AgentParameters(map_interval=options.map_interval)
-        agent = Agent(session, team, mapper, comparer, source.total, parameters)
-        agent.run(source.scans(), clock, stop_on_signal())
+        run = AgentRun(session, team, mapper, comparer, total, parameters)
+        _run_on(source, run, options)
     return 0
+
+
+def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> None:
+    """Run on the scans chosen: a recording is played at a rate, others come when they come."""
+    stopping = stop_on_signal()
+    if source.live:
+        with scans_of(source, options.scans) as scans:
+            run.run_live(scans, stopping)
+    else:
+        run.run(options.scans.of(source.scans()), ReplayClock(options.rate), stopping)
 
 
 command = Command("Map the scans of one robot, and compare with its team.", _configure, _run)

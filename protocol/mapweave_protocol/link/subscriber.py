@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import takewhile
 from typing import TypeVar
 
 import zenoh
@@ -38,7 +39,11 @@ _log = logging.getLogger(__name__)
 
 
 def joint_maps(
-    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    stopping: Callable[[], bool] = lambda: False,
 ) -> Iterator[JointMap]:
     """Yield the team's joint maps in the order of their versions, without a gap.
 
@@ -52,6 +57,8 @@ def joint_maps(
         Endpoints of the router; by default ``MAPWEAVE_CONNECT`` or this machine.
     timeout
         End after this time without a new one [s]; None never ends.
+    stopping
+        Asked now and then: where it says so, end.
 
     Raises
     ------
@@ -67,7 +74,8 @@ def joint_maps(
         def ask(query: JointQuery) -> list[JointMapMessage]:
             return _ask(session, team, query)
 
-        yield from _in_order(_read(joint_reader(), inbox, timeout), ask)
+        messages = _read(joint_reader(), inbox, timeout)
+        yield from _in_order(takewhile(lambda _: not stopping(), messages), ask)
 
 
 def robot_maps(
