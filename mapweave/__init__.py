@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from mapweave.fusion.align import align
     from mapweave.io.export import export
     from mapweave.io.map_files import load, save
-    from mapweave.io.readers.log import read_scans
+    from mapweave.io.readers.scans import read_scans
     from mapweave.mapping.mapper import Mapper
     from mapweave.maps import Alignment, JointMap, RobotMap
     from mapweave.pictures.picture import plot
@@ -50,7 +50,7 @@ _MODULES = {
     "fuse": "mapweave.team.joint_map",
     "load": "mapweave.io.map_files",
     "plot": "mapweave.pictures.picture",
-    "read_scans": "mapweave.io.readers.log",
+    "read_scans": "mapweave.io.readers.scans",
     "save": "mapweave.io.map_files",
 }
 

@@ -88,6 +88,13 @@ def add_config_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_topic_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--topic``: which laser of a bag."""
+    parser.add_argument(
+        "--topic", metavar="TOPIC", help="the laser of a bag that has several, such as /scan"
+    )
+
+
 def config_of(options: argparse.Namespace) -> "Config":
     """Return the configuration that ``--config`` and the environment make of the defaults.
 

@@ -1,5 +1,6 @@
 """What can go wrong, as exceptions that carry data; the command line turns them into one line."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -50,6 +51,27 @@ class MissingExtraError(MapweaveError):
     def __init__(self, need: str, extra: str) -> None:
         super().__init__(f"{need} needs an optional package: pip install 'mapweave[{extra}]'")
         self.extra = extra
+
+
+class UnknownSourceError(MapweaveError):
+    """A source of scans that neither is a file nor has a scheme that a package knows.
+
+    Parameters
+    ----------
+    name, scheme
+        What was asked for, and what stands before its colon.
+    known
+        The schemes that installed packages bring.
+    """
+
+    def __init__(self, name: str, scheme: str, known: Sequence[str]) -> None:
+        there = f"those known are {', '.join(known)}" if known else "no package here brings one"
+        super().__init__(
+            f"source {name!r}: no such file, and no scheme {scheme!r}; {there}; expected a file,"
+            " - for standard input, or SCHEME:..."
+        )
+        self.name = name
+        self.scheme = scheme
 
 
 class ArgumentError(MapweaveError, ValueError):

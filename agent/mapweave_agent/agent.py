@@ -14,6 +14,7 @@ from mapweave.team.hysteresis import keep_joined
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
+from mapweave_agent.live_scans import LiveScans
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
 from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
@@ -34,13 +35,14 @@ from mapweave_protocol.wire.keys import (
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
+LIVE_POLL = 0.02  # [s] after which what arrived is attended to while no scan comes
 MAX_ARRIVALS = 64  # taken in at once, so that a flood does not hold up mapping
 
 _log = logging.getLogger(__name__)
 Stopping = Callable[[], bool]
 
 
-class Agent:
+class AgentRun:
     """One run of a robot.
 
     Parameters
@@ -98,23 +100,52 @@ class Agent:
         self._finished = False
         self._status_due = 0.0
 
+    @property
+    def finished(self) -> bool:
+        """Whether all scans are mapped, and the last map is published."""
+        return self._finished
+
     def run(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
-        """Map all `scans`, then compare with the peers until `stopping`.
+        """Map all `scans` of a recording, then compare with the peers until `stopping`.
 
         Raises
         ------
         FileError
             If the scans cannot be read any further.
         """
+        with self._in_the_team():
+            self._map_all(scans, clock, stopping)
+            self._compare_until(stopping)
+
+    def run_live(self, scans: LiveScans, stopping: Stopping) -> None:
+        """Map `scans` as they come, until there are no more; then compare until `stopping`.
+
+        Raises
+        ------
+        MapweaveError
+            If where the scans come from fails.
+        """
+        with self._in_the_team():
+            while not (stopping() or scans.ended):
+                scan = scans.take(LIVE_POLL)
+                if scan is not None:
+                    self._map(scan)
+                self._attend(0.0)
+            self._compare_until(stopping)
+
+    @contextmanager
+    def _in_the_team(self) -> Iterator[None]:
         with self._outbox, self._listening():
             _log.info("%s joins team %s", self._mapper.robot, self._team)
-            self._map_all(scans, clock, stopping)
-            if not stopping():
-                self._finish()
-            while not stopping():
-                self._attend(POLL)
+            yield
             if self._reception.refused:
                 _log.warning("%d messages were not valid and ignored", self._reception.refused)
+
+    def _compare_until(self, stopping: Stopping) -> None:
+        if not stopping():
+            self._finish()
+        while not stopping():
+            self._attend(POLL)
 
     def _map_all(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         started = time.monotonic()

@@ -3,40 +3,51 @@
 import argparse
 import logging
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
-import zenoh
-
-from mapweave.cli import Command, add_config_argument, argument, config_of, positive
+from mapweave.cli import (
+    Command,
+    add_config_argument,
+    add_topic_argument,
+    argument,
+    config_of,
+    positive,
+)
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
+from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
+from mapweave.io.sources import ScanSource, open_source
 from mapweave.mapping.mapper import Mapper, MapperParameters
-from mapweave.maps import RobotMap
-from mapweave_agent.agent import Agent
+from mapweave_agent.agent import AgentRun
 from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
-from mapweave_agent.past_runs import StateFolder, default_folder, first_component, young_enough
+from mapweave_agent.live_scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
-from mapweave_agent.source import LogSource, ReplayClock, parse_rate
-from mapweave_protocol.errors import MessageError
+from mapweave_agent.source import ReplayClock, count_selected, parse_rate, told_once
+from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
-from mapweave_protocol.link.asking import ask_robot_map
-from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
 from mapweave_protocol.wire.keys import new_boot
-
-RESUME_WITHIN = 3600.0  # [s]
 
 _log = logging.getLogger(__name__)
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", required=True, metavar="ID", help="the robot's id")
-    parser.add_argument("--log", required=True, type=Path, help="the laser log to play")
+    sources = parser.add_mutually_exclusive_group(required=True)
+    sources.add_argument(
+        "--source",
+        metavar="SOURCE",
+        help="where the scans come from: a log or a bag to play, - for lines of JSON on standard"
+        " input, or what an installed package brings",
+    )
+    sources.add_argument(
+        "--log", dest="source", metavar="LOG", help="the laser log to play, as --source"
+    )
+    add_topic_argument(parser)
     parser.add_argument(
         "--rate",
         type=argument(parse_rate),
@@ -82,11 +93,11 @@ def _run(options: argparse.Namespace) -> int:
     robot = check_id("robot", options.robot)
     team, endpoints = connection_of(options)
     config = config_of(options)
-    clock = ReplayClock(options.rate)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
-    source = LogSource.open(options.log, options.scans, _log.warning, config.sensor.angular_step)
-    state = StateFolder(options.state or default_folder(team, robot))
-    runs = state.runs(robot, time.time())
+    step, warn = config.sensor.angular_step, told_once(_log.warning)
+    source = open_source(options.source, ReadOptions(False, step, options.topic, warn))
+    total = count_selected(options.source, source, options.scans)
+    earlier = EarlierRuns.of(team, robot, options.state)
 
     def tell_waiting() -> None:
         _log.info("waiting for a router at %s", ", ".join(endpoints))
@@ -100,22 +111,23 @@ def _run(options: argparse.Namespace) -> int:
     ):
         mapper = Mapper(robot, new_boot(), mapping, backend, config)
         parameters = AgentParameters(map_interval=options.map_interval)
-        past = young_enough(runs, options.resume_within)
-        first = first_component([*(run.map for run in runs), *_held(session, team, robot)])
-        agent = Agent(session, team, mapper, comparer, source.total, parameters, state, past, first)
-        agent.run(source.scans(), clock, stop_on_signal())
+        past = earlier.young(options.resume_within)
+        first = earlier.first_component(session, team, robot)
+        run = AgentRun(
+            session, team, mapper, comparer, total, parameters, earlier.folder, past, first
+        )
+        _run_on(source, run, options)
     return 0
 
 
-def _held(session: zenoh.Session, team: str, robot: str) -> list[RobotMap]:
-    """Return the map of the robot's last run that the coordinator holds, if there is one."""
-    try:
-        message = ask_robot_map(session, team, robot)
-    except MessageError as error:
-        _log.warning("answer ignored, %s", error)
-        return []
-    held = MapAssembler().update(message) if message is not None else None
-    return [] if held is None else [held]
+def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> None:
+    """Run on the scans chosen: a recording is played at a rate, others come when they come."""
+    stopping = stop_on_signal()
+    if source.live:
+        with scans_of(source, options.scans) as scans:
+            run.run_live(scans, stopping)
+    else:
+        run.run(options.scans.of(source.scans()), ReplayClock(options.rate), stopping)
 
 
 command = Command("Map the scans of one robot, and compare with its team.", _configure, _run)

@@ -1,14 +1,12 @@
-"""Where a robot's scans come from: a log, played at the rate asked for."""
+"""A recording as a robot's scans: checked, and played at the rate asked for."""
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable
 
 from mapweave.errors import FileError
-from mapweave.io.readers import read_scans
 from mapweave.io.scan_range import ScanRange
+from mapweave.io.sources import ScanSource
 from mapweave.scan.scan import Scan
 
 NOMINAL_PERIOD = 0.2  # [s] between scans where the stamps do not tell; lidars turn at 5 Hz and more
@@ -34,54 +32,43 @@ def parse_rate(text: str) -> float:
     return rate
 
 
-@dataclass(frozen=True, slots=True)
-class LogSource:
-    """Scans of a log.
+def count_selected(name: str, source: ScanSource, selected: ScanRange) -> int | None:
+    """Read a recording through once, so that what is wrong with it is said before all else.
 
-    Attributes
+    Parameters
     ----------
-    total
-        How many scans are selected.
-    angular_step
-        Between beams [rad], where the log does not state it; None has their number tell.
+    name
+        What the source was called, for errors.
+
+    Returns
+    -------
+    int or None
+        How many of its scans are selected; None for a live source, of which nobody knows.
+
+    Raises
+    ------
+    FileError
+        If it holds no usable scan, or none that is selected.
     """
-
-    path: Path
-    selected: ScanRange
-    total: int
-    angular_step: float | None = None
-
-    @classmethod
-    def open(
-        cls,
-        path: Path,
-        selected: ScanRange,
-        on_warning: Callable[[str], None],
-        angular_step: float | None = None,
-    ) -> "LogSource":
-        """Read the log through once, so that what is wrong with it is said before all else.
-
-        Raises
-        ------
-        FileError
-            If it holds no usable scan, or none that is selected.
-        """
-        read = read_scans(path, angular_step=angular_step, on_warning=on_warning)
-        scans = sum(1 for _ in read)
-        total = selected.count(scans)
-        if total == 0:
-            raise FileError(path, f"has {scans} scans, none of them in {selected}")
-        return cls(path, selected, total, angular_step)
-
-    def scans(self) -> Iterator[Scan]:
-        """Yield the selected scans, without odometry."""
-        step = self.angular_step
-        scans = read_scans(self.path, angular_step=step, on_warning=_already_warned)
-        return self.selected.of(scans)
+    if source.live:
+        return None
+    scans = sum(1 for _ in source.scans())
+    total = selected.count(scans)
+    if total == 0:
+        raise FileError(name, f"has {scans} scans, none of them in {selected}")
+    return total
 
 
-def _already_warned(_: str) -> None:
-    """Damaged lines were reported when the log was opened."""
+def told_once(tell: Callable[[str], None]) -> Callable[[str], None]:
+    """Return `tell` for who reads a recording twice: what was said is not said again."""
+    said: set[str] = set()
+
+    def tell_once(message: str) -> None:
+        if message not in said:
+            said.add(message)
+            tell(message)
+
+    return tell_once
 
 
 class ReplayClock:

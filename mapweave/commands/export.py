@@ -24,4 +24,6 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("Write a map as a picture (svg, png) or as geometry (geojson).", _configure, _run)
+command = Command(
+    "Write a map as a picture, as geometry, as a grid or as a path.", _configure, _run
+)

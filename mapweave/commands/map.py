@@ -5,21 +5,34 @@ import sys
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
-from mapweave.cli import Command, add_config_argument, argument, config_of
+from mapweave.cli import (
+    Command,
+    add_config_argument,
+    add_topic_argument,
+    argument,
+    config_of,
+)
 from mapweave.commands.progress import track
 from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave.ids import check_id
 from mapweave.io.map_files import save
-from mapweave.io.readers import count_scans, read_scans
+from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
+from mapweave.io.sources import STANDARD_INPUT, ScanSource, open_source
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.pictures.picture import check_picture_suffix, plot
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("log", metavar="LOG", type=Path, help="CARMEN, TORO or g2o, may be gzipped")
+    parser.add_argument(
+        "log",
+        metavar="LOG",
+        help="CARMEN, TORO or g2o, may be gzipped; a ROS bag, a file or a folder; or - for lines of"
+        " JSON on standard input",
+    )
+    add_topic_argument(parser)
     parser.add_argument("--output", metavar="MAP.json", type=Path, help="the map file to write")
     parser.add_argument("--robot", metavar="ID", default="r1", help="the robot's id (%(default)s)")
     parser.add_argument(
@@ -46,8 +59,11 @@ def _run(options: argparse.Namespace) -> int:
     config = config_of(options)
     if options.plot:
         check_picture_suffix(options.plot)
-    check_outputs([options.output, options.plot], [options.log])
-    robot_map, taken = _map_log(options, config)
+    inputs = [] if options.log == STANDARD_INPUT else [Path(options.log)]
+    check_outputs([options.output, options.plot], inputs)
+    step, prior = config.sensor.angular_step, options.odometry == "prior"
+    source = open_source(options.log, ReadOptions(prior, step, options.topic, _warn))
+    robot_map, taken = _map_all(options, source, config)
     if options.output:
         save(robot_map, options.output)
     if options.plot:
@@ -56,21 +72,22 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _map_log(options: argparse.Namespace, config: Config) -> tuple[RobotMap, int]:
+def _map_all(
+    options: argparse.Namespace, source: ScanSource, config: Config
+) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
     mapper = Mapper(options.robot, config=config)
-    log, chosen, step = options.log, options.scans, config.sensor.angular_step
-    total = chosen.count(count_scans(log, step)) if sys.stderr.isatty() else None
+    scans = source.count() if sys.stderr.isatty() else None
+    total = None if scans is None else options.scans.count(scans)
+    name = Path(options.log).name
     taken = 0
-    prior = options.odometry == "prior"
-    scans = chosen.of(read_scans(log, odometry=prior, angular_step=step, on_warning=_warn))
-    for scan in track(scans, f"mapping {log.name}", total):
+    for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
         mapper.add(scan)
         taken += 1
     robot_map = mapper.finish()
     if not robot_map.submaps:
         raise FileError(
-            log,
+            options.log,
             f"none of its {taken} chosen scans can be mapped; expected scans whose"
             " returns are dense enough to show walls, and a range of scans that it has",
         )

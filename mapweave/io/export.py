@@ -1,17 +1,20 @@
 """Maps as files for other programs; the file's suffix says which."""
 
-import json
+from collections.abc import Callable
 from pathlib import Path
 
-from mapweave.atomic import replace_file
 from mapweave.errors import FileError
-from mapweave.io.exporters.geojson import feature_collection
+from mapweave.io.exporters import dxf, geojson, map_server, tum
 from mapweave.maps import JointMap, RobotMap
 from mapweave.pictures.picture import PICTURE_SUFFIXES, plot
-from mapweave.pictures.scene import Scene, joint_scenes, robot_scenes
 
-EXPORT_SUFFIXES = (*PICTURE_SUFFIXES, ".geojson")
-PLANNED_SUFFIXES = (".dxf", ".yaml")
+WRITERS: dict[str, Callable[[RobotMap | JointMap, Path], None]] = {
+    **dict.fromkeys(PICTURE_SUFFIXES, plot),
+    **{form.SUFFIX: form.write for form in (geojson, dxf, map_server, tum)},
+}
+"""Suffix to what writes such a file, whole or not at all."""
+
+EXPORT_SUFFIXES = tuple(WRITERS)
 
 
 def export(some_map: RobotMap | JointMap, path: str | Path) -> None:
@@ -22,39 +25,25 @@ def export(some_map: RobotMap | JointMap, path: str | Path) -> None:
     some_map
         A robot's map or a joint map.
     path
-        The file to write: ``.svg`` or ``.png`` for a picture, ``.geojson`` for the geometry.
+        The file to write: ``.svg`` or ``.png`` for a picture, ``.geojson`` or ``.dxf`` for the
+        geometry, ``.yaml`` for a grid (its cells in a ``.pgm`` beside it), ``.tum`` for a robot's
+        path.
 
     Raises
     ------
     FileError
-        If `path` has another suffix or cannot be written.
+        If `path` has another suffix, the map does not hold what it is to show, or it cannot be
+        written.
     MissingExtraError
-        If a picture is asked for and matplotlib is not installed.
+        If a package that it takes is not installed: matplotlib for pictures, ezdxf for DXF.
     """
     path = Path(path)
     check_export_suffix(path)
-    if path.suffix.lower() in PICTURE_SUFFIXES:
-        plot(some_map, path)
-    else:
-        _write_geojson(some_map, path)
+    WRITERS[path.suffix.lower()](some_map, path)
 
 
 def check_export_suffix(path: Path) -> None:
     """Raise FileError unless `path` ends in a suffix that can be written."""
-    suffix = path.suffix.lower()
-    if suffix in EXPORT_SUFFIXES:
-        return
-    known = ", ".join(EXPORT_SUFFIXES)
-    if suffix in PLANNED_SUFFIXES:
-        raise FileError(path, f"{suffix} cannot be written yet; there are {known}")
-    raise FileError(path, f"expected its name to end in one of {known}")
-
-
-def _write_geojson(some_map: RobotMap | JointMap, path: Path) -> None:
-    text = json.dumps(feature_collection(_scenes(some_map)), allow_nan=False, separators=(",", ":"))
-    with replace_file(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
-
-
-def _scenes(some_map: RobotMap | JointMap) -> list[Scene]:
-    return robot_scenes(some_map) if isinstance(some_map, RobotMap) else joint_scenes(some_map)
+    if path.suffix.lower() not in WRITERS:
+        known = ", ".join(EXPORT_SUFFIXES)
+        raise FileError(path, f"expected its name to end in one of {known}")

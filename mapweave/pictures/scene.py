@@ -86,6 +86,17 @@ def tell_confidence(scene: Scene) -> list[str]:
     return [f"confidence {percent(scene.confidence)}"]
 
 
+def scenes_of(some_map: RobotMap | JointMap) -> list[Scene]:
+    """Return one scene for each component of a robot's map or a joint map."""
+    return robot_scenes(some_map) if isinstance(some_map, RobotMap) else joint_scenes(some_map)
+
+
+def largest(scenes: Sequence[Scene]) -> Scene | None:
+    """Return the scene of the most wall; None if there is no wall."""
+    walled = [scene for scene in scenes if len(scene.map.segments)]
+    return max(walled, key=lambda scene: len(scene.map.segments), default=None)
+
+
 def robot_scenes(robot_map: RobotMap) -> list[Scene]:
     """Return one scene for each of the robot's components, in ascending order."""
     return [_robot_scene(robot_map, component) for component in robot_map.components]

@@ -25,7 +25,7 @@ def test_mapper_backend_comparisons_and_log_get_what_the_configuration_says(
         for name in ("ComparisonWorker", "BackendProcess", "open_session")
     }
     made["ask_robot_map"] = Mock(return_value=None)
-    for name, mock in {**made, "Agent": (agent := Mock())}.items():
+    for name, mock in {**made, "AgentRun": (agent := Mock())}.items():
         monkeypatch.setattr(command, name, mock)
     assert main(["agent", "--robot", "a", "--log", str(log), "--config", str(file)]) == 0
     config = Config.load(file)

@@ -8,9 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapweave.errors import FileError
+from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
+from mapweave.io.sources import open_source
 from mapweave.scan.scan import Scan
-from mapweave_agent.source import NOMINAL_PERIOD, LogSource, ReplayClock, parse_rate
+from mapweave_agent.source import (
+    NOMINAL_PERIOD,
+    ReplayClock,
+    count_selected,
+    parse_rate,
+    told_once,
+)
 
 
 def dues(stamps: list[float], rate: float = 1.0) -> list[float]:
@@ -72,14 +80,22 @@ def test_any_other_range_is_refused(text: str) -> None:
         ScanRange.parse(text)
 
 
-def test_selected_scans_keep_their_number_and_bring_no_odometry(logs: list[Path]) -> None:
-    source = LogSource.open(logs[0], ScanRange(5, 9), pytest.fail)
-    scans = list(source.scans())
-    assert source.total == len(scans) == 4
-    assert [scan.index for scan in scans] == [5, 6, 7, 8]
-    assert all(scan.odometry is None for scan in scans)
+def test_a_recording_is_read_through_for_how_many_scans_are_selected(logs: list[Path]) -> None:
+    source = open_source(str(logs[0]), ReadOptions())
+    assert count_selected("log", source, ScanRange(5, 9)) == 4
+    assert [scan.index for scan in ScanRange(5, 9).of(source.scans())] == [5, 6, 7, 8]
+    assert all(scan.odometry is None for scan in source.scans())
+    with pytest.raises(FileError, match=r"log: has \d+ scans, none of them in 99999:"):
+        count_selected("log", source, ScanRange(99999))
 
 
-def test_a_range_beyond_the_log_names_the_file(logs: list[Path]) -> None:
-    with pytest.raises(FileError, match=r"none of them in 5000:"):
-        LogSource.open(logs[0], ScanRange(5000), pytest.fail)
+def test_of_a_live_source_nobody_knows_how_many_scans_there_will_be() -> None:
+    assert count_selected("-", open_source("-", ReadOptions()), ScanRange()) is None
+
+
+def test_a_warning_is_said_once_however_often_it_comes() -> None:
+    said: list[str] = []
+    tell = told_once(said.append)
+    for message in ("a", "b", "a"):
+        tell(message)
+    assert said == ["a", "b"]

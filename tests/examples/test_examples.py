@@ -26,6 +26,7 @@ def run(name: str, *arguments: str | Path, folder: Path) -> str:
     done = subprocess.run(
         [sys.executable, EXAMPLES / name, *arguments],
         cwd=folder,
+        timeout=2 * PATIENCE,
         capture_output=True,
         text=True,
         check=False,
@@ -81,13 +82,13 @@ def running(folder: Path, *command: str | Path) -> Iterator["subprocess.Popen[st
         process = subprocess.Popen(
             command, cwd=folder, stdout=subprocess.PIPE, stderr=complaints, text=True
         )
-        try:
-            with process:
+        with process:
+            try:
                 yield process
                 process.send_signal(signal.SIGINT)
                 process.wait(PATIENCE)
-        finally:
-            process.kill()
+            finally:
+                process.kill()  # before its end is waited for
 
 
 def test_a_subscriber_is_told_each_version_of_the_joint_map(
@@ -108,3 +109,17 @@ def test_a_subscriber_is_told_each_version_of_the_joint_map(
         told = subscriber.stdout.readline()
     assert re.fullmatch(r"version \d+: a/0: \d+ segments, confidence \d\.\d\d\n", told)
     assert subscriber.returncode == 0
+
+
+def test_a_driver_of_ones_own_is_a_robot_of_its_team(tmp_path: Path) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    with ExitStack() as processes:
+        reached = ("--team", "t", "--connect", endpoint)
+        for command in (("router", "--listen", endpoint), ("server", *reached)):
+            processes.enter_context(running(tmp_path, MAPWEAVE, *command))
+        *versions, last = run("own_driver.py", "r1", "t", endpoint, folder=tmp_path).splitlines()
+    assert versions
+    assert all(re.fullmatch(r"version \d+: \{'r1/0': [1-9]\d*\}", line) for line in versions)
+    assert re.fullmatch(r"mapped, \d+ scans skipped", last)

@@ -19,19 +19,38 @@ on Earth; these are metres in a frame that nobody has placed on Earth, as ``crs:
 way of GeoJSON 2008 and ``frame`` in words. Programs must not reproject them.
 """
 
+import json
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from mapweave.atomic import replace_file
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.pictures.scene import Scene, ScenePath, robot_of
+from mapweave.maps import JointMap, RobotMap
+from mapweave.pictures.scene import Scene, ScenePath, robot_of, scenes_of
 
+SUFFIX = ".geojson"
 Json: TypeAlias = dict[str, Any]
 
 DECIMALS = 4  # of a metre, and of a radian: finer than any laser
 FRAME_NOTE = "x y in metres in a local frame, each component in its own; not longitude and latitude"
+
+
+def write(some_map: RobotMap | JointMap, path: Path) -> None:
+    """Write `some_map` to `path`, whole or not at all.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written.
+    """
+    collection = feature_collection(scenes_of(some_map))
+    text = json.dumps(collection, allow_nan=False, separators=(",", ":"))
+    with replace_file(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def feature_collection(scenes: Sequence[Scene]) -> Json:

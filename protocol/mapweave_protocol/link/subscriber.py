@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import takewhile
 from typing import TypeVar
 
 import zenoh
@@ -39,7 +40,11 @@ _log = logging.getLogger(__name__)
 
 
 def joint_maps(
-    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    stopping: Callable[[], bool] = lambda: False,
 ) -> Iterator[JointMap]:
     """Yield the team's joint maps in the order of their versions, without a gap.
 
@@ -54,6 +59,8 @@ def joint_maps(
         Endpoints of the router; by default ``MAPWEAVE_CONNECT`` or this machine.
     timeout
         End after this time without a new one [s]; None never ends.
+    stopping
+        Asked now and then: where it says so, end.
 
     Raises
     ------
@@ -77,7 +84,8 @@ def joint_maps(
         def expect() -> None:
             _expect(sequence, said)
 
-        yield from _in_order(sequence, _read(joint_reader(), inbox, timeout), expect, ask)
+        messages = takewhile(lambda _: not stopping(), _read(joint_reader(), inbox, timeout))
+        yield from _in_order(sequence, messages, expect, ask)
 
 
 def robot_maps(

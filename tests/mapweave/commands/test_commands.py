@@ -170,7 +170,6 @@ BLIND = flaser(Scan(np.full(len(FRONT), np.nan), FRONT, 0, 0.0), np.zeros(3))
 UNUSABLE = {
     "empty": (b"", "is empty"),
     "of another kind": (b"It was a dark and stormy night.\n", "holds no laser scan"),
-    "a map": (b'{"format": "mapweave/map/1"}\n', "holds no laser scan"),
     "blind": (BLIND * 3, "in none of its 3 scans did a beam come back"),
     "damaged": (b"FLASER 181 1 2\nFLASER 181 x\n", "2 damaged lines, the first line 1"),
     "cut to nothing": (gzip.compress(BLIND)[:12], "gzip stream is cut off"),
@@ -188,6 +187,49 @@ def test_a_log_without_a_usable_scan_fails_in_one_line(kind: str, tmp_path: Path
     assert_fails_in_one_line(done, log, problem, "expected a CARMEN, TORO or g2o log")
     assert output.read_text() == "old"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.log", "out.json"]
+
+
+def test_a_map_is_no_log(tmp_path: Path) -> None:
+    path = tmp_path / "map.json"
+    path.write_text('{"format": "mapweave/map/1"}')
+    done = main_here("map", path)
+    assert_fails_in_one_line(done, path, "is of format 'mapweave/map/1'", "mapweave/scans/1")
+
+
+def test_a_source_of_a_scheme_that_nobody_knows_fails_in_one_line() -> None:
+    done = main_here("map", "lidar:/dev/ttyUSB0")
+    assert done.returncode == 1
+    assert done.stderr.startswith("mapweave: source 'lidar:/dev/ttyUSB0': no such file, and no")
+    assert done.stderr.count("\n") == 1
+
+
+def test_scans_on_standard_input_make_the_map_that_their_log_does(
+    scans: list[Scan], tmp_path: Path
+) -> None:
+    lines = [
+        json.dumps(
+            {
+                "stamp": scan.stamp,
+                "angle_min": float(scan.angles[0]),
+                "angle_increment": float(scan.angles[1] - scan.angles[0]),
+                "ranges": [None if np.isnan(r) else r for r in scan.ranges.tolist()],
+            }
+        )
+        for scan in scans
+    ]
+    file = tmp_path / "scans.jsonl"
+    file.write_text("\n".join(['{"format": "mapweave/scans/1"}', *lines]))
+    from_file, from_input = tmp_path / "file.json", tmp_path / "input.json"
+    assert main_here("map", file, "--output", from_file).returncode == 0
+    done = subprocess.run(
+        [sys.executable, "-m", "mapweave", "map", "-", "--output", from_input],
+        input=file.read_bytes(),
+        capture_output=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert from_input.read_bytes() == from_file.read_bytes()
+    assert len(read_map(from_file).submaps[0].trajectory.scan_index) == SCANS
 
 
 def test_a_missing_log_and_a_folder_fail_in_one_line(tmp_path: Path) -> None:

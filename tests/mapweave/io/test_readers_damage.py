@@ -62,7 +62,6 @@ UNUSABLE = {
     "prose": (b"It was a dark night.\nDon't ask.\n", "holds no laser scan"),
     "another log": (b"ODOM 1 2 3 0 0 0 1 host 1\n", "holds no laser scan"),
     "binary": (bytes(range(256)) * 40, "holds no laser scan"),
-    "json": (b'{"format": "mapweave/map/1"}', "holds no laser scan"),
     "blind": (BLIND * 3, "in none of its 3 scans did a beam come back"),
     "blind and damaged": (BLIND * 3 + FLASER[:20], "in none of its 3 scans did a beam come back"),
     "damaged": (FLASER[:30] + b"\n" + FLASER[:40], "2 damaged lines, the first line 1: FLASER has"),

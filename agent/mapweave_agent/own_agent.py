@@ -1,0 +1,205 @@
+"""An agent within a program of one's own, such as a driver: it is fed scan by scan."""
+
+import math
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from numpy.typing import ArrayLike
+
+from mapweave.config import Config
+from mapweave.fusion.align import FusionParameters, align
+from mapweave.ids import check_id
+from mapweave.mapping.mapper import Mapper, MapperParameters
+from mapweave.maps import JointMap
+from mapweave.scan.scan import Scan
+from mapweave_agent.agent import AgentRun
+from mapweave_agent.backend_process import BackendProcess
+from mapweave_agent.comparison_worker import ComparisonWorker
+from mapweave_agent.live_scans import LiveScans
+from mapweave_agent.publication_schedule import AgentParameters
+from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
+from mapweave_protocol.link.arguments import DEFAULT_TEAM
+from mapweave_protocol.link.session import open_session
+from mapweave_protocol.link.subscriber import joint_maps
+from mapweave_protocol.wire.keys import new_boot
+
+
+class Agent:
+    """A robot of a team, fed by the program that it is part of; a context manager.
+
+    Mapping is done in a thread of its own, comparing and closing of loops in processes: a program
+    that starts one is to keep its own start under ``if __name__ == "__main__":``, as
+    `multiprocessing` asks. At the end of the block the map is finished and published.
+
+    Parameters
+    ----------
+    robot, team
+        Ids: the robot's, and its team's.
+    connect
+        Endpoints of the router; by default ``MAPWEAVE_CONNECT`` or this machine.
+    config
+        Sensor, robot and numbers of mapping.
+    on_joint_map
+        Called with each version of the team's joint map, in a thread of its own.
+    patience
+        How long the router is tried [s]; None for as long as it takes.
+    state
+        The folder in which the robot's runs are kept; by default that of its team and name.
+
+    Raises
+    ------
+    InvalidIdError
+        If `robot` or `team` is no id.
+
+    Examples
+    --------
+    ::
+
+        with mapweave_agent.Agent(robot="r1", team="rescue") as agent:
+            for sweep in my_lidar:
+                agent.feed(sweep.ranges, angle_min=-1.57, angle_increment=0.01745, stamp=sweep.time)
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        team: str = DEFAULT_TEAM,
+        *,
+        connect: str | Sequence[str] | None = None,
+        config: Config | None = None,
+        on_joint_map: Callable[[JointMap], None] | None = None,
+        patience: float | None = None,
+        state: str | Path | None = None,
+    ) -> None:
+        self._robot = check_id("robot", robot)
+        self._team = check_id("team", team)
+        self._endpoints = (connect,) if isinstance(connect, str) else connect
+        self._config = Config() if config is None else config
+        self._on_joint_map = on_joint_map
+        self._patience = patience
+        self._state = None if state is None else Path(state)
+        self._scans = LiveScans()
+        self._leaving = threading.Event()
+        self._failure: BaseException | None = None
+        self._fed = 0
+        self._opened = ExitStack()
+
+    @property
+    def skipped(self) -> int:
+        """How many scans came faster than they could be mapped, and are not in the map."""
+        return self._scans.skipped
+
+    @property
+    def waiting(self) -> int:
+        """How many scans were fed and are still to be mapped; few, or the oldest is skipped."""
+        return self._scans.waiting
+
+    def feed(
+        self,
+        ranges: ArrayLike,
+        angle_min: float,
+        angle_increment: float,
+        stamp: float = math.nan,
+        *,
+        range_min: float = 0.0,
+        range_max: float = math.inf,
+    ) -> None:
+        """Hand over a scan; returns at once. Parameters as of `mapweave.Scan.of`.
+
+        Raises
+        ------
+        ArgumentError
+            If it is no scan.
+        MapweaveError
+            If the agent has failed.
+        """
+        self._check_running()
+        scan = Scan.of(
+            ranges,
+            angle_min,
+            angle_increment,
+            range_min=range_min,
+            range_max=range_max,
+            index=self._fed,
+            stamp=stamp,
+        )
+        self._fed += 1
+        self._scans.put(scan)
+
+    def __enter__(self) -> Self:
+        """Join the team; returns once the router has answered.
+
+        Raises
+        ------
+        UnreachableError
+            If it has not for `patience`.
+        """
+        with ExitStack() as stack:
+            run = self._open(stack)
+            self._opened = stack.pop_all()
+        self._threads = [threading.Thread(target=self._map, args=(run,), name=self._robot)]
+        if self._on_joint_map is not None:
+            listen = partial(self._listen, self._on_joint_map)
+            self._threads.append(threading.Thread(target=listen, name="joint maps"))
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Finish the map, publish it and leave; at once where the block failed."""
+        if error is not None:
+            self._leaving.set()
+        self._scans.close()
+        for thread in self._threads:
+            thread.join()
+        self._opened.close()
+        if error is None:
+            self._check_running()
+
+    def _open(self, stack: ExitStack) -> AgentRun:
+        earlier = EarlierRuns.of(self._team, self._robot, self._state)
+        mapping = MapperParameters.of(self._config)
+        compare = partial(align, parameters=FusionParameters.of(self._config))
+        session = stack.enter_context(open_session(self._endpoints, patience=self._patience))
+        comparer = stack.enter_context(ComparisonWorker(compare))
+        backend = stack.enter_context(BackendProcess(mapping.backend))
+        mapper = Mapper(self._robot, new_boot(), mapping, backend, self._config)
+        return AgentRun(
+            session,
+            self._team,
+            mapper,
+            comparer,
+            None,
+            AgentParameters(),
+            earlier.folder,
+            earlier.young(RESUME_WITHIN),
+            earlier.first_component(session, self._team, self._robot),
+        )
+
+    def _map(self, run: AgentRun) -> None:
+        """Map what is fed, until the map is finished or the program leaves."""
+        try:
+            run.run_live(self._scans, lambda: run.finished or self._leaving.is_set())
+        except BaseException as error:  # noqa: BLE001 - handed to the program's own thread
+            self._failure = error
+        finally:
+            self._leaving.set()
+
+    def _listen(self, on_joint_map: Callable[[JointMap], None]) -> None:
+        """Tell the program of each version, until it leaves."""
+        for joint in joint_maps(self._team, connect=self._endpoints, stopping=self._leaving.is_set):
+            on_joint_map(joint)
+
+    def _check_running(self) -> None:
+        if self._failure is not None:
+            raise self._failure

@@ -1,0 +1,230 @@
+"""The laser scans of ROS bags, by `rosbags`; what is whole of one that was cut off.
+
+A recorder that is killed leaves no index, and half a message. `rosbags` reads whole bags only, so
+each format brings a walk through what there is that needs no index.
+"""
+
+import struct
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from mapweave.errors import FileError, MissingExtraError
+from mapweave.io.readers.laser_messages import (
+    LASER_SCAN,
+    LaserDecoder,
+    Message,
+    UnreadableMessageError,
+)
+from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.tally import Tally
+from mapweave.scan.scan import Scan
+
+EXPECTED = "expected a ROS bag (.bag, .db3 or .mcap) with sensor_msgs/LaserScan"
+CUT_OFF = "is cut off or was not closed"
+_DAMAGE: tuple[type[Exception], ...] = (
+    # unpacking
+    *(ValueError, RuntimeError, OSError, EOFError, struct.error),
+    # rosbags, where a length or an id is wrong
+    *(AssertionError, ArithmeticError, MemoryError, TypeError, LookupError),
+)
+"""What is raised for content that is damaged, beside the errors of `rosbags`' readers."""
+
+
+@dataclass(frozen=True, slots=True)
+class BagFormat:
+    """A format of bags.
+
+    Attributes
+    ----------
+    encoding
+        Of its messages: ``cdr`` or ``ros1``.
+    is_whole
+        Tells whether the recorder came to its end.
+    open_whole
+        Opens the reader that `rosbags` has for it.
+    walk
+        Yields the whole messages of a bag that need not be whole.
+    """
+
+    encoding: str
+    is_whole: Callable[[Path], bool]
+    open_whole: Callable[[Path], AbstractContextManager[Any]]
+    walk: Callable[[Path], Iterator[Message]]
+
+
+class Bag(Protocol):
+    """What is read of a bag."""
+
+    @property
+    def cut_off(self) -> str | None:
+        """Why it is not all there; None where it is."""
+
+    def lasers(self) -> dict[str, int]:
+        """Return how many messages each laser topic has."""
+
+    def scans(self, topic: str) -> Iterator[Message]:
+        """Yield the messages of a laser topic, in the order in which they were recorded."""
+
+
+@dataclass(frozen=True, slots=True)
+class WholeBag:
+    """A bag that a reader of `rosbags` has opened."""
+
+    reader: Any
+    encoding: str
+    cut_off: str | None = None
+
+    def lasers(self) -> dict[str, int]:
+        """As of `Bag`."""
+        counts: Counter[str] = Counter()
+        for connection in self.reader.connections:
+            if connection.msgtype == LASER_SCAN:
+                counts[connection.topic] += connection.msgcount
+        return dict(counts)
+
+    def scans(self, topic: str) -> Iterator[Message]:
+        """As of `Bag`."""
+        chosen = [
+            connection
+            for connection in self.reader.connections
+            if connection.msgtype == LASER_SCAN and connection.topic == topic
+        ]
+        for connection, _, data in self.reader.messages(chosen) if chosen else ():
+            yield Message(connection.topic, connection.msgtype, self.encoding, data)
+
+
+@dataclass(frozen=True, slots=True)
+class CutBag:
+    """A bag of which `walk` finds the whole messages."""
+
+    path: Path
+    walk: Callable[[Path], Iterator[Message]]
+    cut_off: str | None = CUT_OFF
+
+    def lasers(self) -> dict[str, int]:
+        """As of `Bag`."""
+        return dict(Counter(message.topic for message in self._scans()))
+
+    def scans(self, topic: str) -> Iterator[Message]:
+        """As of `Bag`."""
+        return (message for message in self._scans() if message.topic == topic)
+
+    def _scans(self) -> Iterator[Message]:
+        """Yield the messages of all lasers, up to where damage leads the walk astray."""
+        try:
+            yield from (m for m in self.walk(self.path) if m.type == LASER_SCAN)
+        except damage_errors():
+            return  # told as `cut_off` already
+
+
+@dataclass(frozen=True, slots=True)
+class SplitBag:
+    """A recording in several files, in their order."""
+
+    parts: Sequence[Bag]
+
+    @property
+    def cut_off(self) -> str | None:
+        """As of `Bag`."""
+        return next((part.cut_off for part in self.parts if part.cut_off), None)
+
+    def lasers(self) -> dict[str, int]:
+        """As of `Bag`."""
+        counts: Counter[str] = Counter()
+        for part in self.parts:
+            counts.update(part.lasers())
+        return dict(counts)
+
+    def scans(self, topic: str) -> Iterator[Message]:
+        """As of `Bag`."""
+        for part in self.parts:
+            yield from part.scans(topic)
+
+
+def open_bag(path: Path, bag_format: BagFormat, stack: ExitStack) -> Bag:
+    """Open the bag at `path`; `stack` closes it.
+
+    Raises
+    ------
+    MissingExtraError
+        If `rosbags` is not installed.
+    """
+    if bag_format.is_whole(path):
+        try:
+            reader = stack.enter_context(bag_format.open_whole(path))
+        except damage_errors():
+            return CutBag(path, bag_format.walk, "has an index that cannot be read")
+        return WholeBag(reader, bag_format.encoding)
+    return CutBag(path, bag_format.walk)
+
+
+def damage_errors() -> tuple[type[Exception], ...]:
+    """Return what is raised for a damaged bag; MissingExtraError if `rosbags` is not installed."""
+    try:
+        from apsw import Error as SqliteError
+        from rosbags.rosbag1 import ReaderError as Reader1Error
+        from rosbags.rosbag2 import ReaderError as Reader2Error
+    except ImportError as error:
+        raise MissingExtraError("reading ROS bags", "bags") from error
+    return (Reader1Error, Reader2Error, SqliteError, *_DAMAGE)
+
+
+def read_bag(path: Path, bag_format: BagFormat, options: ReadOptions) -> Iterator[Scan]:
+    """Yield the scans of one topic of the bag at `path`; parameters and errors as `read_scans`."""
+    with ExitStack() as stack:
+        yield from read_open_bag(path, open_bag(path, bag_format, stack), options)
+
+
+def read_open_bag(path: Path, bag: Bag, options: ReadOptions) -> Iterator[Scan]:
+    """Yield the scans of one topic of a bag, which is open."""
+    tally = Tally("message", EXPECTED, cut_off=bag.cut_off)
+    decoder = LaserDecoder()
+    try:
+        for message in _sound(bag.scans(choose_topic(path, bag, options.topic)), tally):
+            tally.pieces += 1
+            try:
+                scan = decoder.scan(message, tally.scans)
+            except UnreadableMessageError as error:
+                tally.add_damaged(tally.pieces, error)
+                continue
+            tally.add_scan(scan)
+            yield scan
+        if problem := tally.problem():
+            raise FileError(path, problem)
+    finally:  # also where nobody wants the rest
+        tally.warn(path, options)
+
+
+def _sound(messages: Iterator[Message], tally: Tally) -> Iterator[Message]:
+    """Yield `messages` up to where the bag turns out to be damaged."""
+    try:
+        yield from messages
+    except damage_errors() as error:
+        tally.cut_off = f"cannot be read any further ({error})"
+
+
+def choose_topic(path: Path, bag: Bag, asked: str | None) -> str:
+    """Return the laser topic to read: the one asked for, else the only one.
+
+    Raises
+    ------
+    FileError
+        If there is no such topic, none at all, or several of which none was asked for.
+    """
+    lasers = {topic: count for topic, count in sorted(bag.lasers().items()) if count}
+    listed = ", ".join(f"{topic} ({count} scans)" for topic, count in lasers.items())
+    if not lasers:
+        cut_off = f"{bag.cut_off}; " if bag.cut_off else ""
+        raise FileError(path, f"{cut_off}holds no laser scan; {EXPECTED}")
+    if asked is None:
+        if len(lasers) > 1:
+            raise FileError(path, f"has several lasers, {listed}; name one with --topic")
+        return next(iter(lasers))
+    for topic in lasers:
+        if topic.strip("/") == asked.strip("/"):
+            return topic
+    raise FileError(path, f"has no laser scans on topic {asked}; there are {listed}")

@@ -1,0 +1,97 @@
+"""``sensor_msgs/LaserScan``, as it was recorded, to a scan."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mapweave.scan.scan import Scan
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
+LASER_SCAN = "sensor_msgs/msg/LaserScan"
+ROS1, CDR = "ros1", "cdr"
+"""The encodings of ROS 1 and of ROS 2."""
+
+
+class UnreadableMessageError(Exception):
+    """A message that is no whole scan; its text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message of a bag.
+
+    Attributes
+    ----------
+    topic, type
+        Such as ``/scan`` and ``sensor_msgs/msg/LaserScan``.
+    encoding
+        ``cdr`` or ``ros1``.
+    data
+        As it was recorded.
+    """
+
+    topic: str
+    type: str
+    encoding: str
+    data: bytes
+
+
+class LaserDecoder:
+    """Decodes laser scans by what every release of ROS means by one; needs `rosbags`.
+
+    The definitions that a bag brings along are not needed: this message has not changed since
+    ROS 1, and bags hold definitions of other messages that nobody can read.
+    """
+
+    def __init__(self) -> None:
+        from rosbags.typesys import Stores, get_typestore
+
+        self._ros1: Typestore = get_typestore(Stores.ROS1_NOETIC)
+        self._ros2: Typestore = get_typestore(Stores.ROS2_HUMBLE)
+
+    def scan(self, message: Message, index: int) -> Scan:
+        """Return the scan in `message`, the `index`-th of its topic.
+
+        Raises
+        ------
+        UnreadableMessageError
+            If it is not whole, or its angles are none.
+        """
+        try:
+            return _scan(self._decode(message), index)
+        except (_serde_error(), struct.error, ValueError, IndexError) as error:
+            raise UnreadableMessageError(str(error) or "is not whole") from error
+
+    def _decode(self, message: Message) -> Any:  # noqa: ANN401 - made at run time from its definition
+        if message.encoding == ROS1:
+            return self._ros1.deserialize_ros1(message.data, LASER_SCAN)
+        return self._ros2.deserialize_cdr(message.data, LASER_SCAN)
+
+
+def _serde_error() -> type[Exception]:
+    from rosbags.serde import SerdeError
+
+    return SerdeError
+
+
+def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
+    """Return the scan; a reading of the maximum, and beyond, is one that did not come back."""
+    maximum = laser.range_max
+    measured = laser.ranges.astype(np.float64)
+    if maximum > 0:  # False for NaN; one that is no distance states nothing
+        measured = np.where(measured < maximum, measured, np.nan)
+    stamp = laser.header.stamp
+    return Scan.of(
+        measured,
+        laser.angle_min,
+        laser.angle_increment,
+        range_min=laser.range_min if laser.range_min > 0 else 0.0,  # also where it is NaN
+        index=index,
+        stamp=stamp.sec + stamp.nanosec * 1e-9,
+    )

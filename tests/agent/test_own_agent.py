@@ -1,0 +1,135 @@
+"""An agent that a program feeds, and one that lines on standard input do, around a real router."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mapweave_agent
+from mapweave.errors import ArgumentError, InvalidIdError
+from mapweave.io.readers import read_scans
+from mapweave.mapping.mapper import Mapper
+from mapweave.maps import RobotMap
+from mapweave.scan.scan import Scan
+from mapweave_protocol.errors import UnreachableError
+from mapweave_protocol.link.session import open_session
+from tests.agent.test_agent import MAPWEAVE, PATIENCE, SCANS, Listener
+
+MILLIMETRE = 1.1e-3  # [m] what travels is rounded to
+
+
+def scans_of(log: Path) -> list[Scan]:
+    return list(read_scans(log))[:SCANS]
+
+
+def as_line(scan: Scan) -> str:
+    return json.dumps(
+        {
+            "stamp": scan.stamp,
+            "angle_min": float(scan.angles[0]),
+            "angle_increment": float(scan.angles[1] - scan.angles[0]),
+            "ranges": scan.ranges.tolist(),
+        }
+    )
+
+
+def assert_mapped(robot_map: RobotMap, scans: list[Scan]) -> None:
+    """Assert that the map is that of all `scans`, as they would be mapped at rest."""
+    mapper = Mapper(robot_map.robot)
+    for scan in scans:
+        mapper.add(scan)
+    expected = mapper.finish()
+    assert len(robot_map.submaps) == len(expected.submaps) > 0
+    for submap, other in zip(robot_map.submaps, expected.submaps, strict=True):
+        paths = submap.trajectory, other.trajectory
+        np.testing.assert_array_equal(paths[0].scan_index, paths[1].scan_index)
+        np.testing.assert_allclose(paths[0].pose, paths[1].pose, atol=MILLIMETRE)
+
+
+def test_lines_on_standard_input_are_mapped_as_their_log_is(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans = scans_of(logs[0])
+    where = ["--robot", "a", "--team", team, "--connect", endpoint, "--source", "-"]
+    with open_session([endpoint], patience=PATIENCE) as session:
+        listener = Listener(session, team)
+        with subprocess.Popen(
+            [MAPWEAVE, "agent", *where], stdin=subprocess.PIPE, text=True
+        ) as process:
+            assert process.stdin is not None
+            process.stdin.write("".join(f"{as_line(scan)}\n" for scan in scans))
+            process.stdin.close()
+            listener.until(lambda: listener.finished("a"))
+            process.terminate()
+            assert process.wait(PATIENCE) == 0
+    assert_mapped(listener.maps["a"], scans)
+    assert listener.statuses["a"].scans_seen == SCANS
+
+
+def test_what_is_wrong_with_standard_input_ends_the_agent_in_one_line(
+    endpoint: str, team: str
+) -> None:
+    where = ["--robot", "a", "--team", team, "--connect", endpoint, "--source", "-"]
+    done = subprocess.run(
+        [MAPWEAVE, "agent", *where],
+        input='{"format": "mapweave/map/1"}\n',
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("mapweave: standard input: is of format")
+    assert "Traceback" not in done.stderr
+
+
+def test_a_program_feeds_an_agent_and_its_map_is_complete_when_the_block_ends(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans = scans_of(logs[0])
+    with open_session([endpoint], patience=PATIENCE) as session:
+        listener = Listener(session, team)
+        with mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE) as agent:
+            for scan in scans:
+                while agent.waiting:
+                    time.sleep(0.01)
+                agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+        listener.until(lambda: listener.finished("a"))
+    assert agent.skipped == 0
+    assert_mapped(listener.maps["a"], scans)
+
+
+def test_what_is_no_scan_is_refused_where_it_is_fed(endpoint: str, team: str) -> None:
+    with (
+        mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE) as agent,
+        pytest.raises(ArgumentError, match="angle_increment"),
+    ):
+        agent.feed([1.0, 2.0], 0.0, 0.0)
+
+
+def test_a_block_that_fails_ends_the_agent_at_once(endpoint: str, team: str) -> None:
+    with (
+        pytest.raises(RuntimeError, match="lidar unplugged"),
+        mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE),
+    ):
+        raise RuntimeError("lidar unplugged")
+
+
+def test_without_a_router_the_block_does_not_begin(team: str) -> None:
+    agent = mapweave_agent.Agent("a", team, connect="tcp/127.0.0.1:1", patience=0.5)
+    with pytest.raises(UnreachableError), agent:
+        pytest.fail("began")
+
+
+def test_an_id_that_is_none_is_refused_at_once() -> None:
+    with pytest.raises(InvalidIdError, match="robot 'R 1'"):
+        mapweave_agent.Agent("R 1")
+
+
+def test_importing_the_package_loads_no_solver() -> None:
+    code = "import mapweave_agent, sys; sys.exit('gtsam' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
