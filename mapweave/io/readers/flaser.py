@@ -67,6 +67,10 @@ _COARSEST = 0.1
 """[rad] Of resolutions that are taken for radians."""
 
 
+_ROUNDED = 0.03
+"""Of a step, by which a stated one may differ: a URG's 0.3516° is written as 0.35 and as 0.36."""
+
+
 class FlaserBeams:
     """Where the beams of the ``FLASER`` lines of one log look.
 
@@ -88,10 +92,10 @@ class FlaserBeams:
             return
         value = _number(words[2])
         if 0 < abs(value) <= 360:  # False for NaN
-            self._stated[words[1]] = value
+            self._stated[words[1]], self._ignored = value, ""
         else:
             self._stated.pop(words[1], None)
-            self._ignored = f"PARAM {words[1].decode()} states no angle in degrees, and was ignored"
+            self._ignored = f"PARAM {words[1].decode()} is no angle in degrees and does not count"
         self._known.clear()
 
     def of(self, count: int) -> Beams:
@@ -124,7 +128,7 @@ class FlaserBeams:
             return _of_number(count)._replace(assumed=assumed)
         size = abs(step) if step else _step_over(field, count)
         if not _fits(count, size, field):
-            assumed = f"PARAM {_RESOLUTION.decode()} does not fit {count} beams, and was ignored"
+            assumed = f"PARAM {_RESOLUTION.decode()} fits not {count} beams and does not count"
             if not field:
                 beams = _of_number(count)
                 return beams._replace(assumed="; ".join(filter(None, (assumed, beams.assumed))))
@@ -165,8 +169,8 @@ def _is_of_number(count: int, field: float, step: float | None) -> bool:
     if not known:
         return False
     if step is not None:
-        return abs(step - known) <= 0.01 * known
-    return (count - 1.5) * known <= field <= (count + 0.5) * known
+        return abs(step - known) <= _ROUNDED * known
+    return abs(field - (count - 1) * known) <= 2 * known
 
 
 def _fits(count: int, step: float, field: float) -> bool:

@@ -11,7 +11,10 @@ from mapweave.io.readers.parser import ForeignLineError
 from mapweave.io.readers.records import LaserRecord
 from mapweave.scan.scan import Scan
 
-EXPECTED = "expected a CARMEN, TORO or g2o log with FLASER or ROBOTLASER1 lines, plain, gzip or zip"
+EXPECTED = (
+    "expected a CARMEN, TORO or g2o log with FLASER or ROBOTLASER1 lines, or Player's; plain, gzip"
+    " or zip"
+)
 
 _MOST_ASSUMED = 4
 """Sentences in a warning: a log of more kinds of scans is not one anybody recorded."""
@@ -87,7 +90,7 @@ class Tally:
         said = [f"dropped {self._damage()}"] if self._damaged else []
         assumed = [*self._assumed, *filter(None, [self._stamps.assumed])]
         if assumed:
-            said.append(f"assumed that {'; that '.join(assumed)}")
+            said.append(f"assumed: {'; '.join(assumed)}")
         if said:
             on_warning(f"{path}: {'; '.join(said)}")
 
