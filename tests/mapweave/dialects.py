@@ -21,7 +21,8 @@ class Sensor(NamedTuple):
     @property
     def angles(self) -> FloatArray:
         """(n,) [rad] in the order of its readings."""
-        return np.radians(self.start + self.step * np.arange(self.beams))
+        angles: FloatArray = np.radians(self.start + self.step * np.arange(self.beams))
+        return angles
 
 
 def drive() -> FloatArray:
