@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mapweave.geometry.sectors import Sector, within
 from mapweave.lines.polylines import group_polylines
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
@@ -20,6 +21,15 @@ class ObservationParameters(StageParameters):
         lambda c: math.inf if c.sensor.max_range is None else c.sensor.max_range,
         gt=0,
         description="[m] readings at or beyond it are no returns",
+    )
+    min_range: float = derived(
+        lambda c: c.sensor.range_min,
+        ge=0,
+        description="[m] readings nearer than it are no returns",
+    )
+    masks: tuple[Sector, ...] = derived(
+        lambda c: c.sensor.masks,
+        description="[°] directions in which the sensor sees the robot itself",
     )
     segments: SegmentationParameters = derived(SegmentationParameters.of)
     max_gap: float = derived(
@@ -62,7 +72,7 @@ class Observation:
 
 def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     """Approximate `scan` with segments and group them (paper, V, the first two steps)."""
-    scan = _without_far(scan, parameters.max_range)
+    scan = _measured(scan, parameters)
     found = extract_segments(scan, parameters.segments)
     order, polyline = group_polylines(found.segments, parameters.max_gap)
     rank = np.argsort(order)
@@ -75,8 +85,13 @@ def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     return Observation(scan, lines, oriented, join_points([oriented, between]))
 
 
-def _without_far(scan: Scan, max_range: float) -> Scan:
-    """Return `scan` with no return for each reading at or beyond `max_range` [m]."""
+def _measured(scan: Scan, parameters: ObservationParameters) -> Scan:
+    """Return `scan` with no return for each reading that is none of what is around the robot."""
+    p = parameters
     with np.errstate(invalid="ignore"):
-        far = scan.ranges >= max_range
-    return replace(scan, ranges=np.where(far, np.nan, scan.ranges)) if far.any() else scan
+        left_out = (scan.ranges >= p.max_range) | (scan.ranges < p.min_range)
+    if p.masks:
+        left_out |= within(scan.angles, p.masks) & scan.hits
+    if not left_out.any():
+        return scan
+    return replace(scan, ranges=np.where(left_out, np.nan, scan.ranges))

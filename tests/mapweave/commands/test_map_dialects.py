@@ -153,6 +153,32 @@ def test_the_largest_range_that_a_sensor_is_set_to_holds_whichever_way_it_turns(
     assert reach(near) < reach(free) - 1
 
 
+def test_what_the_sensor_sees_of_its_own_robot_is_left_out_where_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sensor = Sensor(-180, 1, 360)
+    log = write(tmp_path, with_body(dialects.robotlaser(sensor)))
+    monkeypatch.setenv("MAPWEAVE_SENSOR_MASKS", "[[120, -120]]")
+    masked = run_map(log, tmp_path)
+    assert_is_the_drive(masked)
+    assert masked.made_with is not None
+    assert masked.made_with.config["sensor"]["masks"] == [[120.0, -120.0]]
+    monkeypatch.delenv("MAPWEAVE_SENSOR_MASKS")
+    monkeypatch.setenv("MAPWEAVE_SENSOR_RANGE_MIN", "0.4")
+    assert_is_the_drive(run_map(log, tmp_path))
+
+
+def with_body(text: str) -> str:
+    """Return a log of 360 beams, from behind on, that see the robot itself 60° to either side."""
+    changed = []
+    for line in text.splitlines():
+        words = line.split()
+        for beam in [*range(60), *range(301, 360)]:
+            words[9 + beam] = "0.300"
+        changed.append(" ".join(words) + "\n")
+    return "".join(changed)
+
+
 def reach(robot_map: RobotMap) -> float:
     """Return how far [m] from the first submap's origin a wall was seen."""
     return float(np.abs(robot_map.submaps[0].map.segments).max())
