@@ -95,7 +95,7 @@ class FlaserBeams:
             self._stated[words[1]], self._ignored = value, ""
         else:
             self._stated.pop(words[1], None)
-            self._ignored = f"PARAM {words[1].decode()} is no angle in degrees and does not count"
+            self._ignored = f"PARAM {words[1].decode()} is no angle in degrees and is ignored"
         self._known.clear()
 
     def of(self, count: int) -> Beams:
@@ -128,7 +128,7 @@ class FlaserBeams:
             return _of_number(count)._replace(assumed=assumed)
         size = abs(step) if step else _step_over(field, count)
         if not _fits(count, size, field):
-            assumed = f"PARAM {_RESOLUTION.decode()} fits not {count} beams and does not count"
+            assumed = f"PARAM {_RESOLUTION.decode()} does not fit {count} beams and is ignored"
             if not field:
                 beams = _of_number(count)
                 return beams._replace(assumed="; ".join(filter(None, (assumed, beams.assumed))))

@@ -181,7 +181,7 @@ def test_a_field_of_view_that_is_none_does_not_count_and_this_is_said(
 ) -> None:
     (scan,), (said,) = read(tmp_path, beams(181, f"{FOV} {value}\nPARAM\n{FOV}\n"))
     np.testing.assert_allclose(degrees(scan)[[0, -1]], [-90, 90])
-    assert "PARAM laser_front_laser_fov is no angle in degrees and does not count" in said
+    assert "PARAM laser_front_laser_fov is no angle in degrees and is ignored" in said
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_a_resolution_that_does_not_fit_the_beams_does_not_count_and_this_is_sai
 ) -> None:
     (scan,), (said,) = read(tmp_path, beams(count, head))
     assert degrees(scan)[-1] == pytest.approx(last)
-    assert f"PARAM laser_front_laser_resolution fits not {count} beams and does not count" in said
+    assert f"PARAM laser_front_laser_resolution does not fit {count} beams and is ignored" in said
 
 
 def test_what_the_user_knows_of_the_beams_goes_before_what_the_log_says(tmp_path: Path) -> None:
