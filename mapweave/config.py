@@ -10,6 +10,7 @@ the defaults::
 The environment goes before the file, and the file before the defaults.
 """
 
+import json
 import math
 import reprlib
 import tomllib
@@ -19,12 +20,20 @@ from pathlib import Path
 from typing import Annotated, NamedTuple, TypeAlias
 
 from annotated_types import Ge, Le
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
 
 from mapweave.errors import ConfigError
 
-Value: TypeAlias = float | int | None
+Value: TypeAlias = float | int | list[list[float]] | None
 """Of a setting; None where it is not set and the scans tell."""
 
 DEFAULT = "default"
@@ -68,6 +77,19 @@ _Share: TypeAlias = Annotated[float, Unit("")]
 _Count: TypeAlias = Annotated[int, Unit("")]
 
 
+def _tuples(value: object) -> object:
+    """Return a list of lists, as files have it, as the tuples that it is checked to be."""
+    if not isinstance(value, list):
+        return value
+    return tuple(tuple(each) if isinstance(each, list) else each for each in value)
+
+
+_Direction: TypeAlias = Annotated[float, Field(ge=-360, le=360)]
+_Sectors: TypeAlias = Annotated[
+    tuple[tuple[_Direction, _Direction], ...], BeforeValidator(_tuples), Unit("°")
+]
+
+
 class _Checked(BaseModel):
     """Checked when it is made: what is wrong is a `ConfigError`, one line that names the field."""
 
@@ -94,12 +116,19 @@ class Sensor(_Checked):
         le=1000,
         description="readings at or beyond it are no returns; unset: as the log has it",
     )
+    range_min: _Metres = Field(0.0, ge=0, le=100, description="nearer readings are no returns")
+    masks: _Sectors = Field(
+        (),
+        max_length=32,
+        description="from one direction counter-clockwise to another, in which the sensor sees the"
+        " robot itself: no returns",
+    )
     angular_step: Annotated[float | None, Unit("rad")] = Field(
         None,
         ge=1e-4,
         le=0.2,
-        description="between beams, where the log does not say (FLASER); unset: as their number"
-        " suggests",
+        description="between beams, where the log does not say (FLASER); unset: as its PARAM or"
+        " their number suggests",
     )
     rate: Annotated[float | None, Unit("Hz")] = Field(
         None,
@@ -231,7 +260,7 @@ class Config(_Checked):
 
     def values(self) -> dict[str, dict[str, Value]]:
         """Return the plain values, by section and name."""
-        values: dict[str, dict[str, Value]] = self.model_dump()
+        values: dict[str, dict[str, Value]] = self.model_dump(mode="json")
         return values
 
     def __eq__(self, other: object) -> bool:
@@ -259,7 +288,7 @@ def _in_file(path: Path) -> Iterator[tuple[str, _Given]]:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(origin, "", f"cannot be read ({error.strerror})") from error
-    except ValueError as error:  # not UTF-8, or not TOML
+    except (ValueError, RecursionError) as error:  # not UTF-8, or not TOML, or nested too deeply
         raise ConfigError(origin, "", f"expected a file in TOML ({error})") from error
     for section, table in content.items():
         if section not in _sections():
@@ -282,11 +311,11 @@ def _in_environment(environ: abc.Mapping[str, str]) -> Iterator[tuple[str, _Give
 
 
 def _number(text: str) -> object:
-    """Return the number that `text` is; `text` itself where it is none."""
-    for kind in (int, float):
+    """Return the number, or the list of them, that `text` is; `text` itself where it is none."""
+    for kind in (json.loads,) if text.lstrip().startswith("[") else (int, float):
         try:
             return kind(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
     return text
 
@@ -306,6 +335,8 @@ def _first_problem(model: type[_Checked], error: ValidationError) -> ConfigError
 
 def _expected(field: FieldInfo) -> str:
     """Return what a field takes, for a person: ``a number from 0.001 to 0.2 [m]``."""
+    if _unit(field) == "°":
+        return "pairs of directions from -360 to 360 [°], such as [[100, 140]]"
     low = [each.ge for each in field.metadata if isinstance(each, Ge)]
     high = [each.le for each in field.metadata if isinstance(each, Le)]
     kind = "a whole number" if field.annotation is int else "a number"

@@ -142,7 +142,7 @@ class MadeWithFile(_Model):
     """What a map was made with; the settings are those of the version that made it."""
 
     program: str
-    config: dict[str, dict[str, int | float | str | bool | None]]
+    config: dict[str, dict[str, int | float | str | bool | list[list[float]] | None]]
 
     def to_made_with(self) -> MadeWith:
         """Return it as the library's value."""

@@ -16,6 +16,7 @@ from mapweave.errors import ConfigError
 
 SECTIONS: dict[str, type[BaseModel]] = {"sensor": Sensor, "robot": Robot, "mapping": Mapping}
 FIELDS = [(section, name) for section, model in SECTIONS.items() for name in model.model_fields]
+NUMBERS = [each for each in FIELDS if each != ("sensor", "masks")]
 
 
 @pytest.fixture
@@ -77,7 +78,7 @@ def test_a_variable_that_is_empty_and_other_variables_say_nothing() -> None:
     assert Config.load(None, environ) == Config()
 
 
-@pytest.mark.parametrize(("section", "name"), FIELDS)
+@pytest.mark.parametrize(("section", "name"), NUMBERS)
 def test_every_setting_has_a_unit_a_description_and_bounds_around_its_default(
     section: str, name: str
 ) -> None:
@@ -89,11 +90,11 @@ def test_every_setting_has_a_unit_a_description_and_bounds_around_its_default(
     if field.default is None:
         assert type(None) in get_args(field.annotation)
     else:
-        assert low < field.default < high
+        assert low <= field.default < high
 
 
 def out_of_bounds() -> Iterator[tuple[str, str, str]]:
-    for section, name in FIELDS:
+    for section, name in NUMBERS:
         low, high = bounds(SECTIONS[section].model_fields[name])
         whole = isinstance(SECTIONS[section].model_fields[name].default, int)
         beyond = 1 if whole else 1e-6
@@ -122,6 +123,12 @@ def test_a_value_out_of_bounds_is_refused_with_what_was_expected(
         ("[sensor]\nmax_range = inf", "sensor.max_range: expected a number from 0.1 to 1000 [m]"),
         ("[sensor]\nmax_range = nan", "sensor.max_range: expected a number from 0.1 to 1000 [m]"),
         ("[sensor]\nrate = [1]", "sensor.rate: expected a number from 0.1 to 1000 [Hz]"),
+        ("[sensor]\nmasks = 3", "sensor.masks: expected pairs of directions from -360 to 360 [°]"),
+        ("[sensor]\nmasks = [90, 100]", "sensor.masks: expected pairs of directions"),
+        ("[sensor]\nmasks = [[90, 361]]", "sensor.masks: expected pairs of directions"),
+        ("[sensor]\nmasks = [[90, 100, 110]]", "sensor.masks: expected pairs of directions"),
+        (f"[sensor]\nmasks = {'[' * 5000}", "expected a file in TOML ("),
+        (f"[sensor]\nmasks = {[[0, 1]] * 33}", "sensor.masks: expected pairs of directions"),
         ("[mapping]\npatience = 2.5", "mapping.patience: expected a whole number from 1 to 1000"),
         (
             "[robot]\nspeed = 1",
@@ -193,3 +200,19 @@ def test_a_configuration_is_not_changed_once_it_is_made() -> None:
 
 def test_the_robot_turns_by_half_a_turn_a_second_and_drives_2_m_by_default() -> None:
     assert (Config().robot.max_turn_rate, Config().robot.max_speed) == (math.pi, 2.0)
+
+
+def test_the_directions_in_which_a_sensor_sees_its_robot_are_pairs_of_degrees(file: Path) -> None:
+    file.write_text("[sensor]\nmasks = [[100, 140.5], [-140, -100]]")
+    pairs = [[100.0, 140.5], [-140.0, -100.0]]
+    assert Config.load(file).values()["sensor"]["masks"] == pairs
+    variable = {"MAPWEAVE_SENSOR_MASKS": " [[100, 140.5], [-140, -100]]"}
+    assert Config.load(None, variable) == Config.load(file)
+    assert hash(Config.load(None, variable)) == hash(Config.load(file))
+
+
+@pytest.mark.parametrize("value", ["[", "[" * 100_000, "[[1]]", "[[1, true]]", "[[null, 1]]", "x"])
+def test_what_is_no_pair_of_degrees_is_refused_from_the_environment_too(value: str) -> None:
+    line = said(None, {"MAPWEAVE_SENSOR_MASKS": value})
+    assert line.startswith("MAPWEAVE_SENSOR_MASKS: sensor.masks: expected pairs of directions")
+    assert len(line) < 200

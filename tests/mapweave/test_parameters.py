@@ -69,7 +69,14 @@ MEASURED: dict[str, dict[str, object]] = {
     "MapperParameters": {"patience": 5},
     "MergingParameters": {"max_step": 0.12, "max_gap": 0.3, "end_noise": 0.05, "max_shift": 0.03},
     "MultiviewIcpParameters": {"scales": (0.15, 0.1, 0.06, 0.04, 0.04), "noise": 0.1},
-    "ObservationParameters": {"max_range": math.inf, "max_gap": 0.5, "spacing": 0.2, "sight": 25.0},
+    "ObservationParameters": {
+        "max_range": math.inf,
+        "min_range": 0.0,
+        "masks": (),
+        "max_gap": 0.5,
+        "spacing": 0.2,
+        "sight": 25.0,
+    },
     "PartParameters": {"length": 36.0},
     "PlaceRecognitionParameters": {},
     "PoseCovarianceParameters": {"noise": 0.1},
@@ -149,7 +156,12 @@ def test_stages_within_a_stage_keep_what_is_their_own() -> None:
 ])  # fmt: skip
 def test_every_setting_changes_a_number_of_some_stage(section: str, name: str) -> None:
     default = getattr(getattr(Config(), section), name)
-    other = 8.0 if default is None else type(default)(default * 0.9) if default < 1 else default - 1
+    others = {"masks": ((100.0, 140.0),), "range_min": 0.2}
+    if name in others:
+        other = others[name]
+    else:
+        lower = default is not None and type(default)(default * 0.9 if default < 1 else default - 1)
+        other = 8.0 if default is None else lower
     changed = Config.model_validate({section: {name: other}})
     assert any(stage.of(changed) != stage.of(Config()) for stage in WHOLES)
 
@@ -205,8 +217,12 @@ def configurations() -> st.SearchStrategy[Config]:
     """Any configuration within its bounds."""
 
     def of(model: type[Sensor | Robot | Mapping]) -> st.SearchStrategy[dict[str, Any]]:
-        values = {}
+        values: dict[str, st.SearchStrategy[Any]] = {}
         for name, field in model.model_fields.items():
+            if name == "masks":
+                direction = st.floats(-360, 360)
+                values[name] = st.lists(st.tuples(direction, direction), max_size=3)
+                continue
             low, high = bounds(field)
             numbers: st.SearchStrategy[Any] = (
                 st.integers(int(low), int(high))
@@ -239,6 +255,40 @@ def test_readings_at_or_beyond_the_sensors_range_are_no_returns() -> None:
     np.testing.assert_array_equal(seen.hits, scan.ranges < reach)
     np.testing.assert_array_equal(seen.ranges[seen.hits], scan.ranges[seen.hits])
     assert observe(scan, ObservationParameters()).scan is scan
+
+
+def test_readings_nearer_than_the_sensors_least_range_are_no_returns() -> None:
+    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND)
+    near = float(np.nanmedian(scan.ranges))
+    seen = observe(scan, ObservationParameters.of(Config(sensor=Sensor(range_min=near)))).scan
+    np.testing.assert_array_equal(seen.hits, scan.ranges >= near)
+    np.testing.assert_array_equal(seen.ranges[seen.hits], scan.ranges[seen.hits])
+
+
+@pytest.mark.parametrize(
+    ("mask", "masked"),
+    [((100, 140), (100, 140)), ((-170, -100), (-170, -100)), ((190, 260), (-170, -100)),
+     ((0, 0), (0, 0)), ((-180, 180), (-180, 180)), ((-20, -10), (-20, -10))],
+)  # fmt: skip
+def test_where_the_sensor_is_masked_nothing_came_back(
+    mask: tuple[float, float], masked: tuple[float, float]
+) -> None:
+    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND + 1e-9)
+    seen = observe(scan, ObservationParameters.of(Config(sensor=Sensor(masks=(mask,))))).scan
+    degrees = np.round(np.degrees(scan.angles))
+    inside = (degrees > masked[0]) & (degrees < masked[1])
+    outside = (degrees < masked[0]) | (degrees > masked[1])
+    assert not seen.hits[inside].any()
+    np.testing.assert_array_equal(seen.ranges[outside], scan.ranges[outside])
+
+
+def test_a_mask_over_half_a_turn_goes_counter_clockwise_from_its_first_direction() -> None:
+    scan = cast(walls_of(BUILDING), [9, 1, 0.3], angles=AROUND)
+    sensor = Sensor(masks=((140, 100), (0, 10)))
+    seen = observe(scan, ObservationParameters.of(Config(sensor=sensor))).scan
+    degrees = np.degrees(scan.angles)
+    assert not seen.hits[(degrees < 99.5) | (degrees > 140.5)].any()
+    np.testing.assert_array_equal(seen.hits[281:320], scan.hits[281:320])  # 101° to 139°
 
 
 def walk(step: float, count: int, rng: np.random.Generator) -> list[Scan]:

@@ -6,9 +6,11 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.io.readers.beams import DamagedLineError
 from mapweave.io.readers.lines import Line
-from mapweave.io.readers.log import check_is_file, parse_line, read_lines
-from mapweave.io.readers.records import DamagedLineError, LaserRecord
+from mapweave.io.readers.log import check_is_file, read_lines
+from mapweave.io.readers.parser import LogParser
+from mapweave.io.readers.records import LaserRecord
 
 _VERTEX_KINDS = (b"VERTEX2 ", b"VERTEX_SE2 ")
 _UNKNOWN: FloatArray = np.full(3, np.nan)
@@ -45,12 +47,12 @@ def read_reference_poses(path: str | Path) -> tuple[IntArray, FloatArray]:
 def _laser_poses(path: Path) -> list[FloatArray]:
     """Return the pose of every whole scan; NaN for one in a graph that follows no vertex."""
     poses: list[FloatArray] = []
-    is_graph, vertex = False, _UNKNOWN
+    parser, is_graph, vertex = LogParser(), False, _UNKNOWN
     for line in read_lines(path):
         if line.text.startswith(_VERTEX_KINDS):
             is_graph, vertex = True, _vertex_pose(line)
             continue
-        record = _whole_record(line)
+        record = _whole_record(parser, line)
         if record is None:
             continue
         poses.append(_laser_on(vertex, record) if is_graph else record.laser_pose)
@@ -66,9 +68,9 @@ def _vertex_pose(line: Line) -> FloatArray:
         return _UNKNOWN
 
 
-def _whole_record(line: Line) -> LaserRecord | None:
+def _whole_record(parser: LogParser, line: Line) -> LaserRecord | None:
     try:
-        return parse_line(line)
+        return parser.parse(line)
     except DamagedLineError:
         return None  # It takes no index; whoever reads the scans is warned of it.
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Protocol
 
 from mapweave.errors import FileError
-from mapweave.io.readers import bag_folder, db3, log, mcap, ros1_bag, scan_lines
+from mapweave.io.readers import log, scan_lines
 from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags import bag_folder, db3, mcap, ros1_bag
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
 from mapweave.scan.scan import Scan
 
@@ -50,21 +51,22 @@ def read_scans(
     Parameters
     ----------
     path
-        A CARMEN log (``FLASER`` or ``ROBOTLASER1``), a TORO or g2o graph with ``ROBOTLASER1``, or
-        lines of JSON (``mapweave/scans/1``): plain, gzip or a zip that holds one. A ROS 1 bag, a
-        ROS 2 bag in SQLite or MCAP, or a folder of one, with or without ``metadata.yaml``: of one
-        that was cut off, all whole messages. Its content tells, not its name.
+        A CARMEN log (``FLASER`` or ``ROBOTLASER1``), a TORO or g2o graph with ``ROBOTLASER1``, a
+        Player log (``laser``), or lines of JSON (``mapweave/scans/1``): plain, gzip or a zip that
+        holds one. A ROS 1 bag, a ROS 2 bag in SQLite or MCAP, or a folder of one, with or without
+        ``metadata.yaml``: of one that was cut off, all whole messages. Its content tells, not its
+        name.
     odometry
         Fill `Scan.odometry` with the robot pose that the line states, where it is finite. (A log
         that another program has corrected states the corrected pose there, too.)
     angular_step
-        Between beams [rad], where a line does not state it (``FLASER``); None has the number of
-        beams tell.
+        Between beams [rad], where a line does not state it (``FLASER``); None has the log's
+        parameters tell, or the number of beams.
     topic
         Of a bag: the laser's topic, such as ``/scan``; None takes the only one there is.
     on_warning
-        Called once, after the last scan, if something was left out; by default a `UserWarning`
-        says so.
+        Called once, after the last scan, if something was left out, or assumed that the file does
+        not say; by default a `UserWarning` says so.
 
     Raises
     ------

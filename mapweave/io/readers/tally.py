@@ -1,10 +1,12 @@
 """What a file of scans held, for the warning or the error at its end."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mapweave.io.readers.options import ReadOptions
 from mapweave.scan.scan import Scan
+
+MOST_ASSUMED = 4  # sentences in a warning: a log of more kinds of scans is not one anybody recorded
 
 
 @dataclass
@@ -33,6 +35,7 @@ class Tally:
     foreign: int = 0
     cut_off: str | None = None
     _first: str = ""
+    _assumed: dict[str, None] = field(default_factory=dict)  # in the order of the file
 
     def add_scan(self, scan: Scan) -> None:
         """Count a whole scan."""
@@ -45,15 +48,22 @@ class Tally:
         self.foreign += foreign
         self._first = self._first or f"{self.piece} {number}: {error}"
 
+    def assume(self, what: str) -> None:
+        """Note what the file does not say and was assumed; nothing where `what` is empty."""
+        if what and len(self._assumed) < MOST_ASSUMED:
+            self._assumed[what] = None
+
     def problem(self) -> str | None:
         """Tell why no scan was usable; None if one was."""
         return None if self.hits else f"{self._why_unusable()}; {self.expected}"
 
     def warn(self, path: Path | str, options: ReadOptions) -> None:
-        """Warn, once, if something was left out and not everything."""
+        """Warn once, if scans are used, of those that were not and of what was assumed."""
         found = [f"dropped {self._damage()}"] if self.damaged else []
         if self.cut_off:
             found.append(f"{self.cut_off}: its {self.scans} whole scans were read")
+        if self._assumed:
+            found.append(f"assumed: {'; '.join(self._assumed)}")
         if self.hits and found:
             options.on_warning(f"{path}: {'; '.join(found)}")
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.sectors import Sector, within
 from mapweave.lines.polylines import group_polylines
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
@@ -22,6 +23,15 @@ class ObservationParameters(StageParameters):
         lambda c: math.inf if c.sensor.max_range is None else c.sensor.max_range,
         gt=0,
         description="[m] readings at or beyond it are no returns",
+    )
+    min_range: float = derived(
+        lambda c: c.sensor.range_min,
+        ge=0,
+        description="[m] readings nearer than it are no returns",
+    )
+    masks: tuple[Sector, ...] = derived(
+        lambda c: c.sensor.masks,
+        description="[°] directions in which the sensor sees the robot itself",
     )
     segments: SegmentationParameters = derived(SegmentationParameters.of)
     max_gap: float = derived(
@@ -92,14 +102,19 @@ class Observation:
 def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     """Approximate `scan` with segments, and orient its returns (paper, V, the first step)."""
     p = parameters
-    scan = _without_far(scan, p.max_range)
+    scan = _measured(scan, p)
     found = extract_segments(scan, p.segments)
     oriented, between = scan_points(scan, found, p.sight, p.spacing)
     return Observation(scan, found, oriented, join_points([oriented, between]), p.max_gap)
 
 
-def _without_far(scan: Scan, max_range: float) -> Scan:
-    """Return `scan` with no return for each reading at or beyond `max_range` [m]."""
+def _measured(scan: Scan, parameters: ObservationParameters) -> Scan:
+    """Return `scan` with no return for each reading that is none of what is around the robot."""
+    p = parameters
     with np.errstate(invalid="ignore"):
-        far = scan.ranges >= max_range
-    return replace(scan, ranges=np.where(far, np.nan, scan.ranges)) if far.any() else scan
+        left_out = (scan.ranges >= p.max_range) | (scan.ranges < p.min_range)
+    if p.masks:
+        left_out |= within(scan.angles, p.masks) & scan.hits
+    if not left_out.any():
+        return scan
+    return replace(scan, ranges=np.where(left_out, np.nan, scan.ranges))

@@ -10,7 +10,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.io.readers.laser_messages import LASER_SCAN
+from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from mapweave.errors import FileError, MissingExtraError
-from mapweave.io.readers import bags, count_scans, db3, mcap, read_scans, ros1_bag
-from mapweave.io.readers.laser_messages import LASER_SCAN
+from mapweave.io.readers import count_scans, read_scans
+from mapweave.io.readers.ros_bags import bags, db3, mcap, ros1_bag
+from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN
 from mapweave.scan.scan import Scan
 from tests.mapweave.io.bag_files import ROS1, ROS2, Laser, lasers, write_bag, write_recording
 

@@ -8,7 +8,7 @@ import pytest
 from mapweave.atomic import check_outputs
 from mapweave.errors import FileError
 from mapweave.io.readers import read_scans
-from mapweave.io.readers.records import DamagedLineError, beam_angles
+from mapweave.io.readers.beams import DamagedLineError, beam_angles
 
 WHOLE = "FLASER 3 1.0 2.0 3.0 0 0 0 0 0 0 1.0 host 1.0\n"
 

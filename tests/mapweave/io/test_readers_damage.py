@@ -50,7 +50,7 @@ DAMAGED = {
     "too long": FLASER[:-1] + b" 1" * MAX_LINE + b"\n",
     "no remissions": ROBOTLASER[:75] + b"\n",
     "too few remissions": ROBOTLASER.replace(b" 1 9", b" 2 9"),
-    "no resolution": ROBOTLASER.replace(b" 0.25 ", b" 0 "),
+    "no resolution": ROBOTLASER.replace(b" 1.0 0.25 ", b" 0 0 "),
     "a resolution that is not finite": ROBOTLASER.replace(b" 0.25 ", b" nan "),
     "more than a turn": ROBOTLASER.replace(b" 0.25 ", b" 3 "),
     "a start that is not finite": ROBOTLASER.replace(b" -0.5 ", b" inf "),

@@ -8,10 +8,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from mapweave.io.readers.bags import BagFormat, read_bag
-from mapweave.io.readers.laser_messages import CDR, Message
 from mapweave.io.readers.options import ReadOptions
-from mapweave.io.readers.sqlite_pages import table_rows
+from mapweave.io.readers.ros_bags.bags import BagFormat, read_bag
+from mapweave.io.readers.ros_bags.laser_messages import CDR, Message
+from mapweave.io.readers.ros_bags.sqlite_pages import table_rows
 from mapweave.scan.scan import Scan
 
 MAGIC = b"SQLite format 3\0"

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from mapweave.errors import FileError, MissingExtraError
-from mapweave.io.readers.laser_messages import (
+from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags.laser_messages import (
     LASER_SCAN,
     LaserDecoder,
     Message,
     UnreadableMessageError,
 )
-from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.tally import Tally
 from mapweave.scan.scan import Scan
 

@@ -6,8 +6,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from mapweave.errors import FileError
-from mapweave.io.readers import db3, mcap
-from mapweave.io.readers.bags import (
+from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags import db3, mcap
+from mapweave.io.readers.ros_bags.bags import (
     EXPECTED,
     Bag,
     BagFormat,
@@ -17,8 +18,7 @@ from mapweave.io.readers.bags import (
     open_bag,
     read_open_bag,
 )
-from mapweave.io.readers.laser_messages import CDR
-from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags.laser_messages import CDR
 from mapweave.scan.scan import Scan
 
 _HEAD = 16  # bytes that tell a format

@@ -8,9 +8,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mapweave.io.readers.bags import BagFormat, read_bag
-from mapweave.io.readers.laser_messages import CDR, Message
 from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags.bags import BagFormat, read_bag
+from mapweave.io.readers.ros_bags.laser_messages import CDR, Message
 from mapweave.scan.scan import Scan
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -1,0 +1,34 @@
+"""Whether the stamps of a log can be used."""
+
+import math
+
+_FEW = 10
+"""Scans whose stamps need not tell time: so few may be taken at once."""
+
+
+class Stamps:
+    """Whether the stamps of a log tell the time: that some are odd is common, and no matter."""
+
+    def __init__(self) -> None:
+        self._scans = 0
+        self._onwards = 0
+        self._back = 0
+        self._last = math.nan
+
+    def add(self, stamp: float) -> None:
+        """Count one more scan, taken at `stamp` [s]; NaN where it is not known."""
+        self._scans += 1
+        self._onwards += stamp > self._last
+        self._back += stamp < self._last
+        self._last = self._last if math.isnan(stamp) else stamp
+
+    @property
+    def assumed(self) -> str:
+        """What is assumed where they tell none; empty where they do."""
+        if math.isnan(self._last) and self._scans > 1:
+            return "scans follow each other evenly, as they have no stamps"
+        if self._scans < _FEW or self._onwards > self._back:
+            return ""
+        if not self._back:
+            return f"scans follow each other evenly, as all have the stamp {self._last:.6g}"
+        return "scans follow each other evenly, as more of their stamps run back than on"
