@@ -25,12 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--logs",
         nargs="+",
-        default=["fr079", "intel"],
+        default=["seattle", "intel"],
         metavar="NAME",
-        help="cut up and compared (fr079 intel)",
+        help="cut up and compared (seattle intel)",
     )
     parser.add_argument(
-        "--stretches", type=int, default=6, metavar="N", help="a log is cut into (6)"
+        "--stretches", type=int, nargs="+", default=[6, 12], metavar="N", help="cuts (6 12)"
     )
     parser.add_argument(
         "--before", metavar="COMMIT", help="measure its mapweave map as well: takes minutes"

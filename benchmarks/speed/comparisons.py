@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.logs import find_logs
+from benchmarks.logs import Log, find_logs
 from benchmarks.pairs import choose_pairs
 from benchmarks.peer_features import feature_peers
 from benchmarks.peer_types import Peer, View
@@ -32,15 +32,21 @@ COMPARED = (150, 500, 1500, 5000)
 Pairs = Sequence[tuple[Stretch, Stretch]]
 
 
-def measure_pairs(report: Report, logs: Sequence[str], count: int) -> None:
-    """Compare the maps of stretches, `count` a log, as robots do, and have AKAZE match them."""
-    stretches = [s for log in find_logs(logs) for s in map_stretches(log, count)]
-    pairs = [(a, b) for a, b in choose_pairs(stretches, ACROSS, seed=1) if _is_middling(a, b)]
+def measure_pairs(report: Report, logs: Sequence[str], counts: Sequence[int]) -> None:
+    """Compare the maps of stretches of logs as robots do, and have AKAZE match the same pairs.
+
+    Parameters
+    ----------
+    counts
+        Into how many stretches the logs are cut, one cut after the other.
+    """
+    found = find_logs(logs)
+    pairs = [pair for count in counts for pair in _middling_pairs(found, count)]
     times = defaultdict[str, list[float]](list)
     for a, b in pairs:
-        found, seconds = timed(partial(align, a.robot_map, b.robot_map))
-        joined = any(each.decision == "accepted" for each in found)
-        times["joined" if joined else "refused"].append(seconds / len(found))
+        alignments, seconds = timed(partial(align, a.robot_map, b.robot_map))
+        joined = any(each.decision == "accepted" for each in alignments)
+        times["joined" if joined else "refused"].append(seconds / len(alignments))
     for outcome, bound in (("joined", 15), ("refused", 3)):
         if outcome in times:
             row = report.time(
@@ -49,14 +55,22 @@ def measure_pairs(report: Report, logs: Sequence[str], count: int) -> None:
             report.reach(f"comparison, {outcome}", row.median, bound, "ms")
         else:
             report.leave_out(f"comparison, {outcome}", "no pair of these logs ends so")
-    _measure_akaze(report, pairs, count)
+    _measure_akaze(report, pairs, counts)
 
 
-def _is_middling(first: Stretch, second: Stretch) -> bool:
-    return LEAST <= max(first.segments, second.segments) < MOST
+def _middling_pairs(logs: Sequence[Log], count: int) -> Pairs:
+    """Return the pairs of maps of which the larger has so many segments as figures are given for.
+
+    Those within a log come first, then some across buildings.
+    """
+    stretches = [s for log in logs for s in map_stretches(log, count)]
+    every = choose_pairs(stretches, len(stretches) ** 2, seed=1)
+    pairs = [(a, b) for a, b in every if LEAST <= max(a.segments, b.segments) < MOST]
+    within = sum(a.log == b.log for a, b in pairs)
+    return pairs[: within + ACROSS]
 
 
-def _measure_akaze(report: Report, pairs: Pairs, count: int) -> None:
+def _measure_akaze(report: Report, pairs: Pairs, counts: Sequence[int]) -> None:
     try:
         cv2 = importlib.import_module("cv2")
     except ImportError as error:
@@ -65,7 +79,9 @@ def _measure_akaze(report: Report, pairs: Pairs, count: int) -> None:
     cv2.setNumThreads(1)
     akaze = feature_peers(cv2)[0]
     logs = {s.log.name: s.log for pair in pairs for s in pair}
-    views = {view.name: view for log in logs.values() for view in view_stretches(log, count)}
+    names = {s.name for pair in pairs for s in pair}
+    cuts = [(log, count) for log in logs.values() for count in counts]
+    views = {v.name: v for cut in cuts for v in view_stretches(*cut) if v.name in names}
     times = [timed(partial(_match, akaze, views[a.name], views[b.name]))[1] for a, b in pairs]
     if times:
         report.time("comparison, AKAZE as in map_merge", "the same pairs", times)
