@@ -12,6 +12,7 @@ SOURCES := pyproject.toml README.md LICENSE \
 TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
 
 .PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
+.PHONY: bench-speed
 .PHONY: clean distclean mutations
 
 $(STAMP): pyproject.toml
@@ -82,6 +83,9 @@ docs: $(KERNELS)
 bench-map: $(KERNELS)
 	$(BIN)/python -m benchmarks map
 	$(BIN)/python -m benchmarks kidnap
+
+bench-speed: $(KERNELS)
+	$(BIN)/python -m benchmarks speed
 
 bench-fusion: $(KERNELS)
 	$(BIN)/python -m benchmarks fusion

@@ -20,6 +20,7 @@ from benchmarks import (
     team,
     wire,
 )
+from benchmarks.speed import command as speed
 
 
 class Benchmark(Protocol):
@@ -43,6 +44,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "reference": reference,
     "peers": peers,
     "same-results": same_results,
+    "speed": speed,
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,

@@ -18,6 +18,7 @@ from mapweave.geometry.arrays import FloatArray
 
 THRESHOLD = 1.0  # `estimation_confidence` of map_merge
 FULL_AFFINE, GPU, MATCH_CONFIDENCE, LEAST_MATCHES = False, False, 0.3, 6  # OpenCV's defaults
+NEAREST = 2  # features that each is matched with: the best of two
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +42,8 @@ def _feature_peer(cv2: ModuleType, name: str, detector: Any) -> Peer:  # noqa: A
         return Features(view.grid, cv2.detail.computeImageFeatures2(detector, view.grid.image))
 
     def match(first: Features, second: Features) -> Guess | None:
+        if min(len(each.found.getKeypoints()) for each in (first, second)) < NEAREST:
+            return None  # OpenCV refuses to look for more neighbours than there are
         cv2.setRNGSeed(1)  # its RANSAC: the same every time
         matcher = cv2.detail_AffineBestOf2NearestMatcher(
             FULL_AFFINE, GPU, MATCH_CONFIDENCE, LEAST_MATCHES

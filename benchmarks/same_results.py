@@ -13,6 +13,7 @@ import os
 import re
 import subprocess
 import sys
+import sysconfig
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -65,11 +66,13 @@ class Tree:
         SystemExit
             If it fails.
         """
-        environment = {**os.environ, "PYTHONPATH": str(self.site), "PYTHONSAFEPATH": "1"}
-        command = [sys.executable, "-m", "mapweave", *map(str, words)]
+        folders = os.pathsep.join([str(self.site), sysconfig.get_path("purelib")])
+        environment = {**os.environ, "PYTHONPATH": folders, "PYTHONSAFEPATH": "1"}
+        # -S: what is installed as editable would come before everything else.
+        command = [sys.executable, "-S", "-m", "mapweave", *map(str, words)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode not in (0, 3):
-            raise SystemExit(f"{self.results.name}: {' '.join(command[2:])}: {done.stderr.strip()}")
+            raise SystemExit(f"{self.results.name}: {' '.join(command[3:])}: {done.stderr.strip()}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +100,7 @@ def run(options: argparse.Namespace) -> None:
     if not logs:
         raise SystemExit("there is no log to compare on")
     with tempfile.TemporaryDirectory() as folder:
-        trees = _install_commit(options.commit, Path(folder)), _install(ROOT, Path(folder) / "new")
+        trees = install_commit(options.commit, Path(folder)), _install(ROOT, Path(folder) / "new")
         with ThreadPoolExecutor(options.processes) as pool:
             tasks = [pool.submit(_make, t, log, logs[log]) for log in logs for t in trees]
             for task in tasks:
@@ -115,7 +118,7 @@ def _stretches(log: Log) -> list[tuple[int, int]]:
     return list(pairwise(count * k // STRETCHES for k in range(STRETCHES + 1)))
 
 
-def _install_commit(commit: str, folder: Path) -> Tree:
+def install_commit(commit: str, folder: Path) -> Tree:
     """Install `commit` from a work tree that is there only meanwhile."""
     name = _run("git", "rev-parse", "--verify", "--short", f"{commit}^{{commit}}")
     checkout = folder / "checkout"

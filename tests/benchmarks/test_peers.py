@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from benchmarks import fusion
 from benchmarks.logs import Log
+from benchmarks.peer_features import feature_peers
 from benchmarks.peer_figures import balanced_threshold, f1, joined, safe_threshold
 from benchmarks.peer_sweep import correlate
 from benchmarks.peer_trials import Trial, judge, try_peer
@@ -70,7 +72,13 @@ def test_a_peer_finds_one_view_of_a_building_in_another_and_is_surer_than_of_two
 
 
 # KISS-Matcher is left out: its threads decide what it draws, and it offers no seed.
-@pytest.mark.parametrize("peer", PEERS[:2], indirect=True)
+def test_features_find_nothing_in_a_picture_that_shows_none(views: dict[str, View]) -> None:
+    some = next(iter(views.values()))
+    blank = replace(some, grid=replace(some.grid, image=np.full_like(some.grid.image, UNKNOWN)))
+    for peer in feature_peers(pytest.importorskip("cv2")):
+        assert peer.match(peer.prepare(blank), peer.prepare(some)) is None
+
+
 def test_a_peer_that_draws_answers_the_same_every_time(peer: Peer, views: dict[str, View]) -> None:
     first, second = (peer.prepare(views[name]) for name in ("office 1", "arena 1"))
     one, again = peer.match(first, second), peer.match(first, second)

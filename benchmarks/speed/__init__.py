@@ -1,0 +1,1 @@
+"""How much processor time each stage takes, beside what a user would take instead."""
