@@ -11,7 +11,7 @@ from mapweave.cli import main
 from mapweave.config import Config
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.mapping.mapper import MapperParameters
-from mapweave_agent import command
+from mapweave_agent import command, taking_up
 
 
 def test_mapper_backend_comparisons_and_log_get_what_the_configuration_says(
@@ -24,7 +24,7 @@ def test_mapper_backend_comparisons_and_log_get_what_the_configuration_says(
         name: Mock(return_value=nullcontext())
         for name in ("ComparisonWorker", "BackendProcess", "open_session")
     }
-    made["ask_robot_map"] = Mock(return_value=None)
+    monkeypatch.setattr(taking_up, "ask_robot_map", Mock(return_value=None))
     for name, mock in {**made, "AgentRun": (agent := Mock())}.items():
         monkeypatch.setattr(command, name, mock)
     assert main(["agent", "--robot", "a", "--log", str(log), "--config", str(file)]) == 0
