@@ -2,7 +2,8 @@
 
 Stamps are evidence of their own: they jitter, come in batches, repeat and run back. So the time
 between two scans is what their stamps say, or what so many scans usually take, whichever is more.
-Where stamps tell no time at all, nothing is bound here, and the pace of the robot has to do.
+Where stamps tell no time at all, nothing is bound here, and the pace of the robot has to do:
+`MotionModel.reach`.
 """
 
 import math

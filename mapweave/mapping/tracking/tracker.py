@@ -264,7 +264,8 @@ class Tracker:
         """Align from each of `starts` (k, 3); leave out where a robot cannot have got to."""
         p, missed = self.parameters, len(self.missed)
         reach = p.max_step * (1 + missed / 2)  # missed scans took time
-        if missed:
+        untimed = self._reachability.interval is None and self._motion.is_paced
+        if missed or untimed:
             reach = min(reach, self._motion.reach(1 + missed))
         found = [
             t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= reach

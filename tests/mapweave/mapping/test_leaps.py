@@ -1,8 +1,12 @@
 """No step is taken that a robot cannot make, whatever it scores."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from mapweave.mapping.mapper import Mapper
+from tests.mapweave.buildings import BUILDING, walls_of
 from tests.mapweave.mapping.drives import (
     WIDE,
     colonnade,
@@ -35,3 +39,15 @@ def test_a_robot_between_look_alike_pillars_takes_no_leap(
     assert longest_step(robot_map) < 2.0 * interval + 0.25
     off = errors(robot_map, true)
     assert len(off) > 0.9 * len(true) and np.hypot(off[:, 0], off[:, 1]).max() < 0.3
+
+
+@pytest.mark.parametrize(("timed", "placed"), [(True, True), (False, False)])
+def test_where_stamps_tell_no_time_the_pace_bounds_a_step(timed: bool, placed: bool) -> None:
+    """1.2 m between steps of 0.1 m: in a second a robot may, in a step of its own it does not."""
+    way = straight(np.array([2.0, 1.0]), np.array([5.0, 1.0]), 0.1)
+    true = np.vstack([way, way[-1] + np.array([1.2, 0.0, 0.0])])
+    scans = scans_at(walls_of(BUILDING), true, 1.0)
+    mapper = Mapper("a")
+    for scan in scans if timed else [replace(scan, stamp=np.nan) for scan in scans]:
+        last = mapper.add(scan)
+    assert last.placed == placed
