@@ -22,6 +22,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.mapping.place_recognition import PlaceRecognitionParameters, PlaceRecognizer
 from mapweave.maps import Alignment, LineMap, Submap, lines_of
+from mapweave.matching.common_lines import count_common_lines
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.parameters import StageParameters, derived
 
@@ -34,6 +35,9 @@ class ComponentMergingParameters(StageParameters):
         lambda c: FusionParameters.of(c, decision=DecisionParameters.of(c, plain_held=math.inf))
     )
     place_recognition: PlaceRecognitionParameters = derived(PlaceRecognitionParameters.of)
+    min_lines: int = Field(
+        3, ge=1, description="straight lines in common: one corner of a hall is like the next"
+    )
     min_confidence: float = Field(
         0.5,
         gt=0,
@@ -184,9 +188,20 @@ class ComponentMerger:
         self._compared[older, younger] = self._walls[older], self._walls[younger]
         self._due.remove((older, younger))
         alignment = self._compare(submaps, older, younger)
-        if alignment.decision != "accepted":
+        shapes = self._shape(submaps, older), self._shape(submaps, younger)
+        if alignment.decision != "accepted" or not self._tells(*shapes, alignment.transform):
             return None
         return self._moved(submaps, older, younger, alignment.transform)
+
+    def _tells(
+        self, first: PreparedMap | None, second: PreparedMap | None, transform: FloatArray
+    ) -> bool:
+        """Whether what two components share is more than a corner."""
+        if first is None or second is None:
+            return False
+        rasters, p = (first.raster, second.raster), self._p
+        found = count_common_lines(*rasters, transform, second.lines, p.fusion.verification)
+        return found >= p.min_lines
 
     def _compare(self, submaps: Sequence[Submap], older: int, younger: int) -> Alignment:
         """Compare two components anywhere, and where that leaves it open, where track was lost."""

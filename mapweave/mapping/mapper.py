@@ -1,7 +1,8 @@
 """The incremental mapper: a robot's map from its raw scans (paper, V).
 
 Each scan becomes segments, is tracked, and is merged into the growing submap. A scan that fits
-nowhere waits; when several in a row fit nowhere, the robot is lost and starts a new component.
+nowhere waits; when several in a row fit nowhere or are blind, the robot is lost and starts a new
+component.
 """
 
 from dataclasses import dataclass, replace
@@ -36,8 +37,8 @@ class MapperParameters(StageParameters):
     patience: int = derived(
         lambda c: c.mapping.patience,
         ge=1,
-        description="scans in a row that fit nowhere, or were not confirmed by the next one, before"
-        " the robot counts as lost",
+        description="scans in a row that fit nowhere, were not confirmed by the next one, or were"
+        " blind, before the robot counts as lost",
     )
 
 
@@ -137,8 +138,6 @@ class Mapper:
             If its index is not above that of the scan before it.
         """
         seen = observe(self._numbered(scan), self.parameters.observation)
-        if self._tracker.is_blind(seen):
-            return Placement(False, self._component, False, False)  # blind: nothing to place
         finished = len(self._finished)
         lost = False
         placed = self._place(seen)
@@ -203,6 +202,7 @@ class Mapper:
 
     def _start_again(self) -> None:
         """Begin a new component with the scans that wait; they fit each other or wait on."""
+        self._tracker.take_back()
         waiting = self._tracker.missed
         if not self._growing.is_empty:
             self._finish_submap()

@@ -26,6 +26,9 @@ class MotionModelParameters(BaseModel):
     known: int = Field(60, ge=1, description="determined steps that are remembered")
     steps: int = Field(7, ge=1, description="of those, with a like turn, whose median is expected")
     enough: int = Field(3, ge=1, description="of those for a step to be expected at all")
+    paced: int = Field(
+        20, ge=1, description="of those from which its longest step bounds a robot without a clock"
+    )
     alike: float = Field(0.05, gt=0, description="[rad] by which like turns differ")
     alike_share: float = Field(0.3, ge=0, description="of the turn, by which they may differ more")
     held: float = Field(3.0, gt=0, description="points that hold a determined step")
@@ -114,6 +117,11 @@ class MotionModel:
         if len(alike) < p.enough:
             return self._last[0], self._last[1], p.max_sigma
         return median(x for x, _ in alike), median(y for _, y in alike), self._sigma
+
+    @property
+    def is_paced(self) -> bool:
+        """Whether enough steps were determined to say how far it goes in one, at the most."""
+        return len(self._steps) >= self._p.paced
 
     def reach(self, steps: int) -> float:
         """Return how far [m] a robot comes in so many steps, were each as long as its longest."""

@@ -2,7 +2,8 @@
 
 Predict, align, and judge by all that both sides saw. Where the predicted pose does not convince,
 every motion in a window is searched; where that does not convince either, the scan is missed. The
-first one that fits again is on probation until the next one has confirmed it.
+first one that fits again is on probation until the next one has confirmed it. A blind scan, with no
+or too few returns, is missed as well: the robot went on meanwhile.
 
 Odometry, where a scan has it, is one more prediction beside the present pace: it may say where to
 look first, and what would surprise least, but what was seen decides.
@@ -26,6 +27,7 @@ from mapweave.mapping.tracking.acceptance import (
 from mapweave.mapping.tracking.local_map import LocalMap, LocalMapParameters, ScanEvidence
 from mapweave.mapping.tracking.motion_model import MotionModel, MotionModelParameters
 from mapweave.mapping.tracking.observation import Observation
+from mapweave.mapping.tracking.reachability import Reachability, ReachabilityParameters
 from mapweave.maps import LineMap
 from mapweave.matching.correlative import CorrelativeParameters
 from mapweave.matching.icp import Target, align, align_all
@@ -45,6 +47,7 @@ class TrackerParameters(StageParameters):
     correspondence: CorrespondenceParameters = CorrespondenceParameters()
     motion_model: MotionModelParameters = MotionModelParameters()
     acceptance: AcceptanceParameters = AcceptanceParameters()
+    reachability: ReachabilityParameters = derived(ReachabilityParameters.of)
     line_spacing: float = derived(
         lambda c: c.mapping.resolution, gt=0, description="[m] between points on the map's lines"
     )
@@ -87,6 +90,7 @@ class _State(NamedTuple):
     motion_model: MotionModel
     odometry: FloatArray | None
     local: LocalMap
+    reachability: Reachability
 
 
 class Tracker:
@@ -97,7 +101,8 @@ class Tracker:
     pose
         (3,) of the last scan that fitted [m, m, rad].
     missed
-        The scans since then, which fitted nowhere, or were not confirmed by the next one.
+        The scans since then, which fitted nowhere, were not confirmed by the next one, or were
+        blind: these show nothing, but they took their time.
     """
 
     def __init__(self, parameters: TrackerParameters | None = None) -> None:
@@ -107,13 +112,14 @@ class Tracker:
         self._motion = MotionModel(self.parameters.motion_model)
         self._odometry: FloatArray | None = None
         self._local = LocalMap(self.parameters.local_map)
+        self._reachability = Reachability(self.parameters.reachability)
         self._before: _State | None = None  # of the scan on probation
         self._probation: Found = []
 
     def afresh(self) -> "Tracker":
         """Return a tracker of the same robot that knows no place: it moves as it did."""
         other = Tracker(self.parameters)
-        other._motion = self._motion.copy()
+        other._motion, other._reachability = self._motion.copy(), self._reachability.afresh()
         return other
 
     def place(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
@@ -133,14 +139,16 @@ class Tracker:
             All scans that are placed by now and were not before; nothing where this one fits
             nowhere, or is on probation.
         """
+        self._reachability.tick(seen.scan)
         if self.is_blind(seen):
+            self.missed += [] if self._local.is_empty else [seen]
             return []
         before = self._state() if self.missed else None
         found = self._follow(seen, known)
         if self._before is not None:
             if found:
                 return [*self.settle(), *found]
-            self._take_back(seen)
+            self.take_back()
         elif found and before is not None:
             self._before, self._probation = before, found
             return []
@@ -150,6 +158,15 @@ class Tracker:
         """Believe the scan on probation, and return it with those found with it."""
         found, self._probation, self._before = self._probation, [], None
         return found
+
+    def take_back(self) -> None:
+        """Forget the scan on probation, if any: it is missed, as those after it are."""
+        if self._before is not None:
+            doubtful, _ = self._probation[0]
+            since = [doubtful, *self.missed]
+            self.pose, missed, self._motion, self._odometry, self._local, at = self._before
+            self.missed, self._reachability = [*missed, *since], at
+        self._before, self._probation = None, []
 
     def is_blind(self, seen: Observation) -> bool:
         """Whether a scan shows too little to be placed anywhere."""
@@ -165,16 +182,8 @@ class Tracker:
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
-        copies = self._motion.copy(), self._odometry, self._local.copy()
+        copies = self._motion.copy(), self._odometry, self._local.copy(), self._reachability.copy()
         return _State(self.pose, self.missed.copy(), *copies)
-
-    def _take_back(self, seen: Observation) -> None:
-        """Forget the scan on probation, which `seen` did not confirm: both are missed."""
-        if self._before is not None:
-            doubtful, _ = self._probation[0]
-            self.pose, missed, self._motion, self._odometry, self._local = self._before
-            self.missed = [*missed, doubtful, seen]
-        self._before, self._probation = None, []
 
     def _follow(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
         """Go on to `seen`, where it is; miss it, where that is nowhere."""
@@ -186,17 +195,20 @@ class Tracker:
             self._motion.add(se2.between(self.pose, tracked.pose), tracked.information)
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
+        self._reachability.placed(seen.scan, tracked.pose)
         self._local.remember(seen.scan, seen.walls, tracked.pose)
-        return [(seen, tracked), *self._found_again()]
+        return [(seen, tracked), *self._found_again(seen.scan)]
 
-    def _found_again(self) -> Found:
-        """Try the scans that were missed once more, from the last one backwards."""
+    def _found_again(self, last: Scan) -> Found:
+        """Try the scans that were missed before the `last` one, from there backwards."""
         found, pose = [], self.pose
-        for seen in reversed(self.missed):
+        for seen in reversed([seen for seen in self.missed if not self.is_blind(seen)]):
             tracked = self.revisit(seen, pose)
-            if tracked is not None:
+            if tracked is None:
+                continue
+            if self._reachability.joins(seen.scan, tracked.pose, last, pose):
                 found.append((seen, tracked))
-                pose = tracked.pose
+                pose, last = tracked.pose, seen.scan
         self.missed = []
         return found
 
@@ -252,11 +264,15 @@ class Tracker:
         """Align from each of `starts` (k, 3); leave out where a robot cannot have got to."""
         p, missed = self.parameters, len(self.missed)
         reach = p.max_step * (1 + missed / 2)  # missed scans took time
-        if missed:
+        untimed = self._reachability.interval is None and self._motion.is_paced
+        if missed or untimed:
             reach = min(reach, self._motion.reach(1 + missed))
-        return [
+        found = [
             t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= reach
         ]
+        poses = np.array([t.pose for t in found]).reshape(-1, 3)
+        possible = self._reachability.allows(seen.scan, poses)
+        return [t for t, allowed in zip(found, possible, strict=True) if allowed]
 
     def _slides(self, seen: Observation, tracked: ScanMatch) -> list[ScanMatch]:
         """Look along the direction that the walls leave open, if they leave one: a corridor.

@@ -1,0 +1,118 @@
+"""How far a robot can have come between two scans: no farther than its speed and the time allow.
+
+Stamps are evidence of their own: they jitter, come in batches, repeat and run back. So the time
+between two scans is what their stamps say, or what so many scans usually take, whichever is more.
+Where stamps tell no time at all, nothing is bound here, and the pace of the robot has to do:
+`MotionModel.reach`.
+"""
+
+import math
+from collections import deque
+from collections.abc import Collection
+from statistics import median
+from typing import NamedTuple, Self
+
+import numpy as np
+from pydantic import Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.parameters import StageParameters, derived
+from mapweave.scan.scan import Scan
+
+
+class ReachabilityParameters(StageParameters):
+    """What a robot can do, and how much of the past tells it."""
+
+    max_speed: float = derived(lambda c: c.robot.max_speed, gt=0, description="[m/s]")
+    max_turn_rate: float = derived(lambda c: c.robot.max_turn_rate, gt=0, description="[rad/s]")
+    slack: float = derived(
+        lambda c: c.mapping.closeness, gt=0, description="[m] more, as poses err"
+    )
+    turn_slack: float = derived(
+        lambda c: c.mapping.keyframe_turn, gt=0, description="[rad] more, as poses err"
+    )
+    intervals: int = Field(60, ge=1, description="between scans, whose median is the usual one")
+    few: int = Field(10, ge=1, description="of them: as long as there are less, the longest is")
+    window: float = Field(1.0, gt=0, description="[s] of the way that is bound as a whole, too")
+    remembered: int = Field(60, ge=1, description="placed scans, the most, of that way")
+
+
+class _Stay(NamedTuple):
+    """Where a robot was at a scan."""
+
+    number: int
+    stamp: float
+    pose: FloatArray
+
+
+class Reachability:
+    """Knows when a robot was where of late."""
+
+    def __init__(self, parameters: ReachabilityParameters) -> None:
+        self._p = parameters
+        self._intervals: deque[float] = deque(maxlen=parameters.intervals)
+        self._last: tuple[int, float] | None = None
+        self._way: deque[_Stay] = deque(maxlen=parameters.remembered)
+
+    def copy(self) -> Self:
+        """Return one that goes on by itself from here."""
+        other = self.afresh()
+        other._last, other._way = self._last, self._way.copy()
+        return other
+
+    def afresh(self) -> Self:
+        """Return one that knows how long scans take, and of no place."""
+        other = type(self)(self._p)
+        other._intervals = self._intervals.copy()
+        return other
+
+    @property
+    def interval(self) -> float | None:
+        """The time [s] that a scan usually takes; None where stamps do not tell."""
+        known = self._intervals
+        if not known:
+            return None
+        usual = median(known) if len(known) >= self._p.few else max(known)
+        return usual if usual > 0 else None
+
+    def tick(self, scan: Scan) -> None:
+        """Note that `scan` was taken, be it placed or not."""
+        if self._last is not None:
+            index, stamp = self._last
+            interval = (scan.stamp - stamp) / max(scan.index - index, 1)
+            self._intervals.append(interval if math.isfinite(interval) else 0.0)
+        self._last = scan.index, scan.stamp
+
+    def placed(self, scan: Scan, pose: FloatArray) -> None:
+        """Note that `scan` was taken at `pose` (3,); what lies longer ago is let go."""
+        self._way.append(_Stay(scan.index, scan.stamp, pose))
+        while len(self._way) > 1 and self._time(self._way[1], scan) >= self._p.window:
+            self._way.popleft()
+
+    def allows(self, scan: Scan, poses: FloatArray) -> BoolArray:
+        """(k,) whether the robot can have come to each of `poses` (k, 3) by the time of `scan`."""
+        return self._within(self._way, scan, poses)
+
+    def joins(self, scan: Scan, pose: FloatArray, other: Scan, there: FloatArray) -> bool:
+        """Whether it can have been at `pose` (3,) at `scan`, and at `there` (3,) at `other`."""
+        at = _Stay(other.index, other.stamp, there)
+        return bool(self._within([at], scan, pose[None])[0])
+
+    def _within(self, way: Collection[_Stay], scan: Scan, poses: FloatArray) -> BoolArray:
+        """(k,) which of `poses` (k, 3), of `scan`, are near enough to all that is on a `way`."""
+        p = self._p
+        if self.interval is None or not way:
+            return np.ones(len(poses), dtype=np.bool_)
+        time = np.array([self._time(stay, scan) for stay in way])
+        apart = np.abs(poses[:, None] - np.array([stay.pose for stay in way]))
+        turned = np.abs(se2.wrap(apart[..., 2]))
+        near = np.hypot(apart[..., 0], apart[..., 1]) <= p.slack + p.max_speed * time
+        possible = near & (turned <= p.turn_slack + p.max_turn_rate * time)
+        return np.asarray(possible.all(axis=1))
+
+    def _time(self, stay: _Stay, scan: Scan) -> float:
+        """[s] between two scans, the longest that there is evidence for."""
+        counted = max(abs(scan.index - stay.number), 1) * (self.interval or 0.0)
+        told = abs(scan.stamp - stay.stamp)
+        return max(counted, told) if math.isfinite(told) else counted
