@@ -11,6 +11,9 @@
 #include "point_map.hpp"
 #include "polygons.hpp"
 #include "polylines.hpp"
+#include "proposals.hpp"
+#include "raster_icp.hpp"
+#include "rasters.hpp"
 #include "scores.hpp"
 #include "segmentation.hpp"
 #include "slivers.hpp"
@@ -30,6 +33,9 @@ NB_MODULE(_compiled, m) {
   bind_point_map(m);
   bind_polygons(m);
   bind_polylines(m);
+  bind_proposals(m);
+  bind_raster_icp(m);
+  bind_rasters(m);
   bind_scores(m);
   bind_segmentation(m);
   bind_slivers(m);

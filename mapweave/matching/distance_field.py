@@ -4,14 +4,15 @@ Each cell knows the nearest wall sample and how deep it lies in the free space t
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-import scipy
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from mapweave.geometry.segments import lengths
+from mapweave.kernels.matching import rasters
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, points_on_lines
@@ -31,7 +32,7 @@ class DistanceFieldParameters(StageParameters):
     max_cells: int = Field(4_000_000, gt=0, description="a larger map gets coarser cells")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class DistanceField:
     """A line map, sampled and rasterised.
 
@@ -53,6 +54,8 @@ class DistanceField:
         (rows, columns) [m] to it.
     depth
         (rows, columns) [m] from the edge of the seen free space inwards; 0 outside of it.
+    codes
+        (rows, columns) what cells say, by the limits that it hangs on; filled by what asks for it.
     """
 
     oriented: OrientedPoints
@@ -63,6 +66,9 @@ class DistanceField:
     nearest: Int32Array
     distance: Float32Array
     depth: Float32Array
+    codes: dict[tuple[float, float], Int32Array] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @classmethod
     def of(cls, line_map: LineMap, parameters: DistanceFieldParameters) -> "DistanceField":
@@ -76,13 +82,16 @@ class DistanceField:
         low = oriented.points.min(axis=0) - p.border
         high = oriented.points.max(axis=0) + p.border
         cell = max(p.cell, float(np.sqrt(np.prod(high - low) / p.max_cells)))
-        shape = np.ceil((high - low) / cell).astype(np.int64) + 1
-        nearest, distance = _nearest_sample(oriented.points, low, cell, shape)
-        free = fill_polygons(line_map.free_space, low, cell, shape)
+        rows, columns = (int(n) for n in np.ceil((high - low) / cell) + 1)
+        nearest, distance = rasters.nearest_samples(oriented.points, low, cell, rows, columns)
         # The raster's rim is not free: what lies beyond was not looked at.
-        padded = scipy.ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
-        depth = (padded * cell).astype(np.float32)
+        depth = rasters.depths(line_map.free_space, low, cell, rows, columns)
         return cls(oriented, weight, segment, low, cell, nearest, distance, depth)
+
+    @cached_property
+    def own_depth(self) -> Float32Array:
+        """(n,) how deep each sample lies in the free space of its own map [m]."""
+        return self.look_up(self.oriented.points)[2]
 
     def look_up(self, points: FloatArray) -> tuple[Int32Array, Float32Array, Float32Array]:
         """Return nearest sample, distance and free depth at (..., 2) `points` [m], map frame.
@@ -107,47 +116,6 @@ def fill_polygons(
 ) -> BoolArray:
     """Return (rows, columns) which cells' centres lie in any of the simple `polygons` (k, 2) [m].
 
-    Rows run along x and columns along y. In each row the outline crosses at some columns; between
-    an odd and the next crossing is the inside.
+    Rows run along x and columns along y.
     """
-    filled = np.zeros(tuple(shape), dtype=np.bool_)
-    for polygon in polygons:
-        corners = (polygon - origin) / cell - 0.5  # cell centres at whole numbers
-        low = np.clip(np.floor(corners.min(axis=0)), 0, shape).astype(np.int64)
-        high = np.clip(np.ceil(corners.max(axis=0)) + 1, 0, shape).astype(np.int64)
-        if (high > low).all():
-            window = filled[low[0] : high[0], low[1] : high[1]]
-            window |= _inside(corners - low, high - low)
-    return filled
-
-
-def _inside(corners: FloatArray, shape: IntArray) -> BoolArray:
-    """Tell which whole numbers (row, column) of `shape` lie in the polygon of (k, 2) `corners`."""
-    row, column = _crossings(corners, np.roll(corners, -1, axis=0), int(shape[0]))
-    toggles = np.zeros((int(shape[0]), int(shape[1]) + 1), dtype=np.int32)
-    np.add.at(toggles, (row, np.clip(np.ceil(column), 0, shape[1]).astype(np.int64)), 1)
-    inside: BoolArray = np.cumsum(toggles, axis=1)[:, :-1] % 2 == 1
-    return inside
-
-
-def _crossings(start: FloatArray, end: FloatArray, rows: int) -> tuple[IntArray, FloatArray]:
-    """Where edges from (k, 2) `start` to `end`, in cells, cross whole row numbers."""
-    low = np.clip(np.ceil(np.minimum(start[:, 0], end[:, 0])), 0, rows).astype(np.int64)
-    high = np.clip(np.ceil(np.maximum(start[:, 0], end[:, 0])), 0, rows).astype(np.int64)
-    count = high - low
-    edge = np.repeat(np.arange(len(start)), count)
-    row = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + low[edge]
-    run = end[edge] - start[edge]
-    column = start[edge, 1] + (row - start[edge, 0]) / run[:, 0] * run[:, 1]
-    return row, column
-
-
-def _nearest_sample(
-    points: FloatArray, origin: FloatArray, cell: float, shape: IntArray
-) -> tuple[Int32Array, Float32Array]:
-    """Index of, and distance [m] to, the sample nearest to each cell."""
-    index = np.floor((points - origin) / cell).astype(np.int64)
-    owner = np.full(tuple(shape), -1, dtype=np.int32)
-    owner[index[:, 0], index[:, 1]] = np.arange(len(points))
-    distance, (rows, columns) = scipy.ndimage.distance_transform_edt(owner < 0, return_indices=True)
-    return owner[rows, columns], (distance * cell).astype(np.float32)
+    return rasters.filled_cells(list(polygons), origin, cell, int(shape[0]), int(shape[1]))

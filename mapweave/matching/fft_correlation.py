@@ -22,6 +22,7 @@ import scipy
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray
+from mapweave.kernels.matching.marks import Complex64Array, Places, mark_cells
 from mapweave.matching.distance_field import DistanceField
 from mapweave.parameters import StageParameters, derived
 
@@ -123,18 +124,14 @@ def correlate(
         scipy.fft.next_fast_len(int(span[0] / cell) + 2),
         scipy.fft.next_fast_len(int(span[1] / cell) + 2),
     )
-    here = _Grid(reference.low, cell, shape)
-    first, second = (scipy.fft.fft2(here.near(reference, k) / (2 * k)) for k in (1, 2))
-    third = scipy.fft.fft2(here.worth(reference, weight / 2) + 1j * here.metres(reference))
+    low, weight = reference.low, weight / 2
+    here = scipy.fft.fft2(_cells(reference, low, cell, shape, weight, True))
     found = []
     for turn, marks in zip(turns, turned, strict=True):
-        there = _Grid(marks.low, cell, shape)
-        spectrum = first * scipy.fft.fft2(there.wall(marks, 1)).conj()
-        spectrum += second * scipy.fft.fft2(there.wall(marks, 2)).conj()
-        opposite = there.metres(marks) + 1j * there.worth(marks, weight / 2)
-        spectrum += third * scipy.fft.fft2(opposite).conj()
+        there = scipy.fft.fft2(_cells(marks, marks.low, cell, shape, weight, False))
+        spectrum = (here * there.conj()).sum(axis=0)
         shift = _best_shifts(scipy.fft.ifft2(spectrum).real, reference.span / cell, p.shifts)
-        place = here.low - there.low + cell * shift
+        place = low - marks.low + cell * shift
         found.append(np.column_stack([place, np.full(len(place), turn)]))
     return np.concatenate(found)
 
@@ -150,46 +147,16 @@ def _best_shifts(score: FloatArray, size: FloatArray, count: int) -> FloatArray:
     return np.where(shift > size + 1, shift - score.shape, shift)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Grid:
-    """Cells of `cell` [m] from the corner `low` (2,) [m]."""
+def _cells(
+    marks: Marks, low: FloatArray, cell: float, shape: tuple[int, int], weight: float, first: bool
+) -> Complex64Array:
+    """(3, rows, columns) of `shape`: what `marks` put into cells from the corner `low` (2,) [m].
 
-    low: FloatArray
-    cell: float
-    shape: tuple[int, int]
-
-    def wall(self, marks: Marks, power: int) -> ComplexArray:
-        """Metres of wall times their normals to the `power`."""
-        return self._sums(marks.wall, marks.facing**power * marks.metres)
-
-    def metres(self, marks: Marks) -> ComplexArray:
-        """Metres of wall."""
-        return self._sums(marks.wall, marks.metres.astype(np.complex128))
-
-    def near(self, marks: Marks, power: int) -> ComplexArray:
-        """The part of each cell that is near a wall, times its normal to the `power`."""
-        return self._sums(marks.near, marks.alike**power * self._part(marks))
-
-    def worth(self, marks: Marks, weight: float) -> ComplexArray:
-        """What a metre of wall counts in each cell, whichever way it faces.
-
-        An eighth where it is near wall, so that both ways give the quarter; the rest hangs on the
-        normals. Less `weight` where it was seen through.
-        """
-        near = self._sums(marks.near, np.full(len(marks.near), 0.125 * self._part(marks) + 0j))
-        seen = self._sums(marks.seen, np.full(len(marks.seen), weight * self._part(marks) + 0j))
-        return near - seen
-
-    def _part(self, marks: Marks) -> float:
-        return marks.area / self.cell**2
-
-    def _sums(self, places: ComplexArray, values: ComplexArray) -> ComplexArray:
-        """The sum of the `values` (n,) at complex `places` (n,) in each cell."""
-        i = ((places.real - self.low[0]) / self.cell).astype(np.int64)
-        j = ((places.imag - self.low[1]) / self.cell).astype(np.int64)
-        flat, size = i * self.shape[1] + j, self.shape[0] * self.shape[1]
-        real, imaginary = (np.bincount(flat, v, size) for v in (values.real, values.imag))
-        return (real + 1j * imaginary).reshape(self.shape).astype(np.complex64)
+    A metre of wall counts an eighth where it is near wall, whichever way it faces, so that both
+    ways give the quarter; the rest hangs on the normals. Less `weight` where it was seen through.
+    """
+    places = Places(marks.wall, marks.facing, marks.metres, marks.near, marks.alike, marks.seen)
+    return mark_cells(places, low, cell, shape, marks.area / cell**2, weight, first)
 
 
 def _complex(vectors: FloatArray) -> ComplexArray:

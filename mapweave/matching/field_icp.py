@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.matching import raster_icp as kernel
 from mapweave.matching.distance_field import DistanceField
 from mapweave.scan.points import OrientedPoints
 
@@ -44,41 +45,17 @@ def align_on_raster(
     middle = moving.points.mean(axis=0)
     # About the middle, so that turning and shifting do not hinder each other.
     moving = OrientedPoints(moving.points - middle, moving.normals, moving.polyline)
-    poses = _about(transforms, middle)
-    for scale in np.geomspace(p.start_scale, p.end_scale, p.iterations):
-        poses = poses + _steps(reference, moving, poses, float(scale), p)
-    return _about(poses, -middle)
+    moved = kernel.align_on_raster(
+        *(moving.points, np.ascontiguousarray(moving.normals), _about(transforms, middle)),
+        np.geomspace(p.start_scale, p.end_scale, p.iterations),
+        *(reference.oriented.points, reference.oriented.normals, reference.nearest),
+        reference.origin,
+        *(reference.cell, p.min_cosine, p.damping * len(moving)),
+    )
+    return _about(moved, -middle)
 
 
 def _about(transforms: FloatArray, middle: FloatArray) -> FloatArray:
     """(k, 3) the same motions of coordinates less `middle` (2,)."""
     moved = np.column_stack([np.tile(middle, (len(transforms), 1)), np.zeros(len(transforms))])
     return se2.compose(transforms, moved)
-
-
-def _steps(
-    reference: DistanceField,
-    moving: OrientedPoints,
-    poses: FloatArray,
-    scale: float,
-    p: FieldIcpParameters,
-) -> FloatArray:
-    """(k, 3) Gauss-Newton steps of the robust point-to-line cost at (k, 3) `poses`."""
-    c, s = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
-    (x, y), (u, v) = moving.points.T, moving.normals.T
-    arm = np.stack([c * x - s * y, s * x + c * y], axis=-1)
-    points = arm + poses[:, None, :2]
-    nearest, _, _ = reference.look_up(points)
-    apart = points - reference.oriented.points[nearest]
-    normals = reference.oriented.normals[nearest]
-    cosine = (c * u - s * v) * normals[..., 0] + (s * u + c * v) * normals[..., 1]
-    squared = (apart**2).sum(axis=-1)
-    weight = 1 / (1 + squared / scale**2) ** 2  # Geman-McClure
-    weight[(cosine < p.min_cosine) | (squared > 9 * scale**2)] = 0
-    residual = (normals * apart).sum(axis=-1)
-    lever = normals[..., 1] * arm[..., 0] - normals[..., 0] * arm[..., 1]
-    jacobian = np.concatenate([normals, lever[..., None]], axis=-1)
-    weighted = (jacobian * weight[..., None]).transpose(0, 2, 1)
-    damping = p.damping * len(moving) * np.eye(3)
-    gradient = weighted @ residual[..., None]
-    return np.asarray(-np.linalg.solve(weighted @ jacobian + damping, gradient)[..., 0])

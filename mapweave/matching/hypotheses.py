@@ -9,14 +9,13 @@ parallel walls still propose the right transform (``python -m benchmarks referen
 figures in docs/paper.md). The loop as the paper prints it is `mapweave.fusion.reference`.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.matching.distinct import distinct
 from mapweave.lines.directions import likely_turns
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
@@ -26,8 +25,6 @@ from mapweave.matching.verification import VerificationParameters, coarse_scores
 from mapweave.parameters import StageParameters, derived
 from mapweave.shape.corners import CornerParameters, Corners, find_corners, propose
 from mapweave.shape.windows import WindowParameters, Windows, all_windows, match_all
-
-BLOCK = 4096  # proposals that are put in order at once, the best first
 
 
 class HypothesisParameters(StageParameters):
@@ -150,34 +147,6 @@ def _distinct(
     place = transforms[:, :2] + np.column_stack(
         [c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]]
     )
-    kept: list[int] = []
-    for some in _best_first(scores):
-        left = some
-        for other in kept:
-            left = left[_differs(place, transforms[:, 2], left, other, least)]
-        while len(left) and len(kept) < count:
-            kept.append(int(left[0]))
-            left = left[_differs(place, transforms[:, 2], left, kept[-1], least)]
-        if len(kept) == count:
-            break
+    turn = np.ascontiguousarray(transforms[:, 2])
+    kept: list[int] = distinct(place, turn, scores, count, *least).tolist()
     return kept
-
-
-def _best_first(scores: FloatArray) -> Iterator[IntArray]:
-    """Yield indices of the (n,) `scores`, the highest first, a block at a time."""
-    if len(scores) > 2 * BLOCK:
-        limit = np.partition(scores, -BLOCK)[-BLOCK]
-        best, rest = np.flatnonzero(scores >= limit), np.flatnonzero(scores < limit)
-        yield best[np.argsort(-scores[best], kind="stable")]
-        yield rest[np.argsort(-scores[rest], kind="stable")]
-    else:
-        yield np.argsort(-scores, kind="stable")
-
-
-def _differs(
-    place: FloatArray, turn: FloatArray, some: IntArray, other: int, least: tuple[float, float]
-) -> BoolArray:
-    """(n,) which of `some` differ from the `other` one by more than `least` [m], [rad]."""
-    apart = np.hypot(place[some, 0] - place[other, 0], place[some, 1] - place[other, 1])
-    turned = np.abs(se2.wrap(turn[some] - turn[other]))
-    return np.asarray((apart > least[0]) | (turned > least[1]))

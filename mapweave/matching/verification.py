@@ -12,6 +12,7 @@ from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array
+from mapweave.kernels.matching.judging import judge_samples
 from mapweave.kernels.scores import look_up_scores
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
@@ -139,13 +140,21 @@ def _directions(normals: FloatArray) -> FloatArray:
 
 
 def _codes(raster: DistanceField, p: VerificationParameters) -> Int32Array:
-    """(rows, columns) what each cell says: a row of `_worth`, as an offset into it."""
-    row = np.where(raster.depth > p.clearance, SEEN_THROUGH, NOTHING)
-    near = raster.distance < p.closeness
-    facing = _directions(raster.oriented.normals).astype(np.int64) & (DIRECTIONS - 1)
+    """(rows, columns) what each cell says: a row of `_worth`, as an offset into it; made once."""
+    limits = p.closeness, p.clearance
+    if limits not in raster.codes:
+        raster.codes[limits] = _coded(raster, *limits)
+    return raster.codes[limits]
+
+
+def _coded(raster: DistanceField, closeness: float, clearance: float) -> Int32Array:
+    """Work out `_codes`."""
+    row = np.where(raster.depth > clearance, np.int32(SEEN_THROUGH), np.int32(NOTHING))
+    near = raster.distance < closeness
+    facing = _directions(raster.oriented.normals).astype(np.int32) & (DIRECTIONS - 1)
     row[near] = facing[raster.nearest[near]]
     row[[0, -1], :] = row[:, [0, -1]] = NOTHING  # the rim stands for all that lies beyond it
-    return (row * DIRECTIONS).astype(np.int32)
+    return row * np.int32(DIRECTIONS)
 
 
 def _worth(p: VerificationParameters) -> Float32Array:
@@ -213,14 +222,14 @@ def _one_way(
     reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
 ) -> _OneWay:
     """Look the samples of `other` up in `reference`."""
-    placed = other.oriented.moved(transform)
-    nearest, distance, depth = reference.look_up(placed.points)
-    cosine = np.einsum("ij,ij->i", placed.normals, reference.oriented.normals[nearest])
-    near = distance < p.closeness
-    coincides = near & (cosine > p.min_cosine)
-    _, _, own_depth = other.look_up(other.oriented.points)
+    coincides, through, distance = judge_samples(
+        *(other.oriented.points, other.oriented.normals, transform, reference.oriented.normals),
+        *(reference.nearest, reference.distance, reference.depth),
+        reference.origin,
+        *(reference.cell, p.closeness, p.min_cosine, p.clearance),
+    )
     # What its own map saw through later was no wall for long: it refutes nothing.
-    contradicts = ~near & (depth > p.clearance) & (own_depth < p.clearance)
+    contradicts = through & (other.own_depth < p.clearance)
     return _OneWay(
         coincides,
         distance[coincides].astype(np.float64),

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.matching import corners as kernel
 
 
 class CornerParameters(BaseModel):
@@ -68,15 +68,13 @@ def find_corners(segments: FloatArray, parameters: CornerParameters) -> Corners:
     used = np.argsort(-lengths)[: p.max_walls]
     used = used[lengths[used] >= p.min_length]
     walls, vectors, lengths = segments[used], vectors[used], lengths[used]
-    direction = np.arctan2(vectors[:, 1], vectors[:, 0])
-    angle = se2.wrap(direction[None, :] - direction[:, None])
-    turned = (np.abs(np.sin(angle)) >= np.sin(p.min_angle)) & (angle > 0)
-    i, j = np.nonzero(turned & (_end_gaps(walls) <= p.max_gap))
+    i, j, angle = kernel.corner_pairs(walls, p.max_gap, p.min_angle)
     weight = np.minimum(lengths[i], lengths[j])
     best = np.argsort(-weight, kind="stable")[: p.max_corners]
-    i, j = i[best], j[best]
+    i, j, angle = i[best], j[best], angle[best]
     point = _meeting_points(walls[i], vectors[i], walls[j], vectors[j])
-    return Corners(np.column_stack([point, direction[i]]), angle[i, j], weight[best])
+    direction = np.arctan2(vectors[i, 1], vectors[i, 0])
+    return Corners(np.column_stack([point, direction]), angle, weight[best])
 
 
 def propose(reference: Corners, other: Corners, parameters: CornerParameters) -> FloatArray:
@@ -96,26 +94,9 @@ def propose(reference: Corners, other: Corners, parameters: CornerParameters) ->
         first.
     """
     p = parameters
-    apart = se2.wrap(reference.angle[:, None] - other.angle[None, :])
-    i, j = np.nonzero(np.abs(apart) <= p.angle_tolerance)
-    if len(i) == 0:
-        return np.empty((0, 3))
-    # Both walls' directions vote for the rotation: the second's differs by the angles' difference.
-    turn = reference.frame[i, 2] - other.frame[j, 2] + 0.5 * apart[i, j]
-    c, s = np.cos(turn), np.sin(turn)
-    x, y = other.frame[j, 0], other.frame[j, 1]
-    proposals = np.column_stack(
-        [reference.frame[i, 0] - c * x + s * y, reference.frame[i, 1] - s * x - c * y, turn]
-    )
-    return _most_proposed(proposals, np.minimum(reference.weight[i], other.weight[j]), p)
-
-
-def _end_gaps(walls: FloatArray) -> FloatArray:
-    """(n, n) smallest distance between ends of two walls [m]."""
-    ends = walls.reshape(-1, 2, 2)
-    difference = ends[:, None, :, None] - ends[None, :, None, :]
-    gaps: FloatArray = np.sqrt((difference**2).sum(axis=-1).min(axis=(2, 3)))
-    return gaps
+    ours, theirs = (kernel.Frames(c.frame, c.angle, c.weight) for c in (reference, other))
+    limits = p.angle_tolerance, p.vote_cell, p.vote_turn, p.hypotheses
+    return kernel.most_proposed(ours, theirs, *limits)
 
 
 def _meeting_points(
@@ -126,34 +107,3 @@ def _meeting_points(
     cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     along = (between[:, 0] * v[:, 1] - between[:, 1] * v[:, 0]) / cross
     return first[:, :2] + along[:, None] * u
-
-
-def _most_proposed(proposals: FloatArray, weight: FloatArray, p: CornerParameters) -> FloatArray:
-    """Count proposals in cells, each in all cells it is at the edge of, and average the best."""
-    cells = np.array([p.vote_cell, p.vote_cell, p.vote_turn])
-    turns = round(2 * np.pi / p.vote_turn)
-    scaled = proposals / cells
-    scaled[:, 2] = (se2.wrap(proposals[:, 2]) + np.pi) / (2 * np.pi) * turns
-    key = np.floor(scaled).astype(np.int64)
-    key[:, 2] %= turns
-    low = key.min(axis=0)
-    span = key.max(axis=0) - low + 1
-    flat = ((key[:, 0] - low[0]) * span[1] + key[:, 1] - low[1]) * turns + key[:, 2]
-    cell, inverse = np.unique(flat, return_inverse=True)
-    member: IntArray = inverse.astype(np.int64)
-    votes: FloatArray = np.bincount(member, weights=weight, minlength=len(cell)).astype(np.float64)
-    best: IntArray = np.argsort(-votes, kind="stable")[: p.hypotheses]
-    return _cell_means(proposals, weight, member, votes, best)
-
-
-def _cell_means(
-    proposals: FloatArray, weight: FloatArray, member: IntArray, votes: FloatArray, best: IntArray
-) -> FloatArray:
-    """(k, 3) weighted mean proposal of each of the `best` cells."""
-    x, y = (np.bincount(member, weights=weight * proposals[:, k])[best] for k in (0, 1))
-    phase = (
-        np.bincount(member, weights=weight * np.cos(proposals[:, 2]))[best]
-        + 1j * (np.bincount(member, weights=weight * np.sin(proposals[:, 2]))[best])
-    )
-    total = votes[best]
-    return np.column_stack([x / total, y / total, np.angle(phase)])

@@ -17,7 +17,6 @@ points give the rigid motion, and how far the points are apart after it (the res
 windows whose gaps or scale differ, which turn angles over arc length cannot.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -25,6 +24,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from mapweave.kernels.matching.windows import WindowSamples, alike_windows
 
 
 class WindowParameters(BaseModel):
@@ -225,25 +225,18 @@ def match(a: Windows, b: Windows, parameters: WindowParameters) -> Candidates:
     """
     rows, columns = _salient(a, parameters), _salient(b, parameters)
     product = a.codes[rows] / a.codes.shape[1] @ b.codes[columns].conj().T
-    row, column = np.nonzero(product.real**2 + product.imag**2 >= parameters.min_similarity**2)
-    product = product[row, column]
-    similarity = np.minimum(np.abs(product), 1)
-    straightness = np.maximum(a.straightness[rows][row], b.straightness[columns][column])
-    gain = similarity - straightness
-    gain = np.where(gain > parameters.min_gain, gain, -np.inf)
-    peak = _peaks(gain, _places(a, rows)[row], _places(b, columns)[column])
-    row, column, gain = rows[row[peak]], columns[column[peak]], gain[peak]
-    transform, residual = _fit(a, b, row, column, np.angle(product[peak]))
+    ours, theirs = _samples(a, rows), _samples(b, columns)
+    pairs = alike_windows(product, ours, theirs, parameters.min_similarity, parameters.min_gain)
     found = Candidates(
-        a.length * (gain - residual / parameters.residual_scale),
-        similarity[peak],
-        transform,
-        residual,
-        np.full(len(row), a.length),
-        row,
-        column,
+        a.length * (pairs.gain - pairs.residual / parameters.residual_scale),
+        pairs.similarity,
+        pairs.transform,
+        pairs.residual,
+        np.full(len(pairs.row), a.length),
+        rows[pairs.row],
+        columns[pairs.column],
     )
-    return best(found.take(residual <= parameters.max_residual), parameters.max_candidates)
+    return best(found.take(found.residual <= parameters.max_residual), parameters.max_candidates)
 
 
 def match_all(
@@ -276,47 +269,15 @@ def _salient(windows: Windows, parameters: WindowParameters) -> IntArray:
     return np.sort(ranked[complexity[ranked] >= parameters.min_complexity])
 
 
+def _samples(windows: Windows, chosen: IntArray) -> WindowSamples:
+    """Return the chosen windows as they are compared."""
+    straightness = windows.straightness[chosen]
+    return WindowSamples(straightness, _places(windows, chosen), windows.points[chosen])
+
+
 def _places(windows: Windows, chosen: IntArray) -> IntArray:
     """Return places, from 1, for the chosen windows: successive ones for neighbours alone."""
     neighbours = (np.diff(chosen) == 1) & (np.diff(windows.polyline[chosen]) == 0)
     skipped: IntArray = np.cumsum(np.concatenate([[1], ~neighbours]))[: len(chosen)]
     place: IntArray = np.arange(len(chosen)) + skipped
     return place
-
-
-def _peaks(gain: FloatArray, row: IntArray, column: IntArray) -> IntArray:
-    """Return which pairs no neighbouring pair beats; of equal neighbours the first stays.
-
-    Neighbours, one stride away on one or both polylines, stand for the same alignment. Gains are
-    rounded, so that which of equals is the first does not hang on the maps' frames.
-
-    Parameters
-    ----------
-    gain
-        (p,) of each pair; -inf where it is out of the question.
-    row, column
-        (p,) places of its windows, as of `_places`, ascending.
-    """
-    gain = np.round(gain, 9)
-    laid_out = np.full((row.max(initial=0) + 2, column.max(initial=0) + 2), -np.inf)
-    laid_out[row, column] = gain
-    peak = np.flatnonzero(gain > -np.inf)
-    for down, right in itertools.product((-1, 0, 1), repeat=2):
-        if (down, right) == (0, 0):
-            continue
-        beside = laid_out[row[peak] + down, column[peak] + right]
-        own = gain[peak]
-        peak = peak[own > beside if (down, right) < (0, 0) else own >= beside]
-    return peak
-
-
-def _fit(
-    a: Windows, b: Windows, row: IntArray, column: IntArray, rotation: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the (p, 3) rigid motions from b to a with given rotations, and their rms [m] (V1)."""
-    ours, theirs = (w.points[..., 0] + 1j * w.points[..., 1] for w in (a, b))
-    turned = np.exp(1j * rotation)[:, None] * theirs[column]
-    apart = ours[row] - turned
-    shift = apart.mean(axis=1)
-    residual = np.sqrt(np.mean(np.abs(apart - shift[:, None]) ** 2, axis=1))
-    return np.column_stack([shift.real, shift.imag, rotation]), residual

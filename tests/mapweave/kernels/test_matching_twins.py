@@ -1,0 +1,157 @@
+"""What comparing maps takes: the compiled kernels compute what their NumPy twins do."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapweave.kernels.arrays import FloatArray
+from mapweave.kernels.loading import COMPILED
+from mapweave.kernels.matching import (
+    corners,
+    distinct,
+    judging,
+    marks,
+    raster_icp,
+    rasters,
+    windows,
+)
+
+pytestmark = pytest.mark.skipif(COMPILED is None, reason="no compiled kernels here")
+seeds = st.integers(0, 2**32 - 1)
+counts = st.sampled_from([0, 1, 2, 30])
+some = st.sampled_from([1, 2, 30])
+ORIGIN, CELL = np.array([-1.5, -2.0]), 0.2
+
+
+def same(one: object, other: object) -> None:
+    """Check that two results, or two tuples of them, agree."""
+    results = (x if isinstance(x, tuple) else (x,) for x in (one, other))
+    for a, b in zip(*results, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-9, rtol=1e-9)
+
+
+def units(rng: np.random.Generator, count: int) -> FloatArray:
+    angle = rng.uniform(-np.pi, np.pi, count)
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def some_places(rng: np.random.Generator, count: int) -> FloatArray:
+    return rng.uniform(-1.2, 1.2, (count, 2))
+
+
+def a_polygon(rng: np.random.Generator, corners_: int) -> FloatArray:
+    """A star: simple, about some place in or beyond the raster."""
+    angle = np.sort(rng.uniform(0, 2 * np.pi, corners_))
+    reach = rng.uniform(0.1, 2.0, (corners_, 1))
+    return rng.uniform(-2, 2, 2) + reach * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, some, st.sampled_from([(15, 20), (24, 33)]))
+def test_the_nearest_samples_are_as_far(seed: int, count: int, shape: tuple[int, int]) -> None:
+    points = some_places(np.random.default_rng(seed), count)
+    nearest, distance = rasters.nearest_samples(points, ORIGIN, CELL, *shape)
+    twin, apart = rasters.nearest_samples_numpy(points, ORIGIN, CELL, *shape)
+    np.testing.assert_array_equal(distance, apart)
+    cells = np.floor((points - ORIGIN) / CELL)
+    here = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
+    for owner in (nearest, twin):
+        away = np.hypot(*np.moveaxis(cells[owner] - here, -1, 0)) * CELL
+        np.testing.assert_allclose(away, distance, rtol=1e-6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.integers(0, 4), st.integers(3, 12))
+def test_the_same_cells_are_filled_and_as_deep(seed: int, count: int, corners_: int) -> None:
+    rng = np.random.default_rng(seed)
+    asked = [a_polygon(rng, corners_) for _ in range(count)], ORIGIN, CELL, 16, 21
+    np.testing.assert_array_equal(rasters.filled_cells(*asked), rasters.filled_cells_numpy(*asked))
+    np.testing.assert_array_equal(rasters.depths(*asked), rasters.depths_numpy(*asked))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, some, counts)
+def test_samples_find_the_same_in_a_raster(seed: int, count: int, walls: int, starts: int) -> None:
+    rng = np.random.default_rng(seed)
+    there, facing = some_places(rng, walls), units(rng, walls)
+    nearest, distance = rasters.nearest_samples(there, ORIGIN, CELL, 16, 21)
+    depth = rng.uniform(0, 1, nearest.shape).astype(np.float32)
+    points, normals = 1.5 * some_places(rng, count), units(rng, count)
+    pose = rng.normal(0, 0.3, 3)
+    asked = points, normals, pose, facing, nearest, distance, depth
+    limits = ORIGIN, CELL, 0.3, 0.5, 0.4
+    same(judging.judge_samples(*asked, *limits), judging.judge_samples_numpy(*asked, *limits))
+    poses, scales = rng.normal(0, 0.3, (starts, 3)), np.geomspace(0.5, 0.1, 4)
+    moved = points, normals, poses, scales, there, facing, nearest, ORIGIN, CELL, 0.7, 0.3
+    same(raster_icp.align_on_raster(*moved), raster_icp.align_on_raster_numpy(*moved))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts)
+def test_the_same_walls_make_corners(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    walls = np.hstack([start := some_places(rng, count), start + 0.7 * units(rng, count)])
+    same(corners.corner_pairs(walls, 1.0, 0.6), corners.corner_pairs_numpy(walls, 1.0, 0.6))
+
+
+def some_corners(rng: np.random.Generator, count: int) -> corners.Frames:
+    frame = np.hstack([4 * some_places(rng, count), rng.uniform(-np.pi, np.pi, (count, 1))])
+    angle = np.pi / 2 + rng.normal(0, 0.05, count)
+    return corners.Frames(frame, angle, rng.uniform(0.4, 3, count))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, counts, st.sampled_from([3, 1000]))
+def test_the_same_transforms_are_proposed_most(seed: int, one: int, two: int, most: int) -> None:
+    rng = np.random.default_rng(seed)
+    asked = some_corners(rng, one), some_corners(rng, two), 0.09, 0.4, 0.09, most
+    same(corners.most_proposed(*asked), corners.most_proposed_numpy(*asked))
+
+
+def some_windows(rng: np.random.Generator, count: int) -> windows.WindowSamples:
+    place = np.cumsum(rng.integers(1, 3, count)).astype(np.int64)
+    return windows.WindowSamples(rng.uniform(0, 0.9, count), place, rng.normal(0, 1, (count, 5, 2)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, counts)
+def test_the_same_windows_are_alike(seed: int, one: int, two: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows, columns = some_windows(rng, one), some_windows(rng, two)
+    size = rng.choice([0.75, 0.9, 1.0], (one, two))  # equals among them
+    product = size * np.exp(1j * rng.uniform(-np.pi, np.pi, (one, two)))
+    asked = product, rows, columns, 0.7, -0.1
+    same(tuple(windows.alike_windows(*asked)), tuple(windows.alike_windows_numpy(*asked)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, counts, counts, st.booleans())
+def test_maps_put_the_same_into_cells(
+    seed: int, wall: int, near: int, seen: int, is_reference: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    at, normal = ([f(rng, n) @ [1, 1j] for n in (wall, near, seen)] for f in (some_places, units))
+    places = marks.Places(at[0], normal[0], rng.uniform(0, 1, wall), at[1], normal[1], at[2])
+    asked = places, ORIGIN, 0.5, (6, 7), 0.25, 2.5, is_reference
+    np.testing.assert_allclose(
+        marks.mark_cells(*asked), marks.mark_cells_numpy(*asked), rtol=1e-5, atol=1e-6
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, st.sampled_from([1, 5, 50]))
+def test_the_same_transforms_are_distinct(seed: int, count: int, most: int) -> None:
+    rng = np.random.default_rng(seed)
+    scores = rng.integers(0, 9, count).astype(np.float64)  # equals among them
+    asked = some_places(rng, count), rng.uniform(-4, 4, count), scores, most, 0.5, 0.3
+    np.testing.assert_array_equal(distinct.distinct(*asked), distinct.distinct_numpy(*asked))
+
+
+def test_lengths_that_do_not_agree_are_told() -> None:
+    points, normals = np.zeros((3, 2)), np.zeros((2, 2))
+    nearest = np.zeros((2, 2), dtype=np.int32)
+    asked = points, normals, np.zeros((1, 3)), np.ones(1), points, points, nearest
+    for align in (raster_icp.align_on_raster, raster_icp.align_on_raster_numpy):
+        with pytest.raises(ValueError, match="expected"):
+            align(*asked, ORIGIN, CELL, 0.7, 0.3)
