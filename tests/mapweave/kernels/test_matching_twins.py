@@ -44,7 +44,8 @@ def a_polygon(rng: np.random.Generator, corners_: int) -> FloatArray:
     """A star: simple, about some place in or beyond the raster."""
     angle = np.sort(rng.uniform(0, 2 * np.pi, corners_))
     reach = rng.uniform(0.1, 2.0, (corners_, 1))
-    return rng.uniform(-2, 2, 2) + reach * np.column_stack([np.cos(angle), np.sin(angle)])
+    rim = reach * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(rng.uniform(-2, 2, 2) + rim, dtype=np.float64)
 
 
 @settings(max_examples=40, deadline=None)
@@ -131,7 +132,10 @@ def test_maps_put_the_same_into_cells(
     seed: int, wall: int, near: int, seen: int, is_reference: bool
 ) -> None:
     rng = np.random.default_rng(seed)
-    at, normal = ([f(rng, n) @ [1, 1j] for n in (wall, near, seen)] for f in (some_places, units))
+    at, normal = (
+        [(f(rng, n) @ np.array([1, 1j])).astype(np.complex128) for n in (wall, near, seen)]
+        for f in (some_places, units)
+    )
     places = marks.Places(at[0], normal[0], rng.uniform(0, 1, wall), at[1], normal[1], at[2])
     asked = places, ORIGIN, 0.5, (6, 7), 0.25, 2.5, is_reference
     np.testing.assert_allclose(
