@@ -124,7 +124,7 @@ def cast(
     ranges = np.where(met, distance, np.inf).min(axis=1)
     if noise is not None:
         ranges = ranges + noise.normal(0.0, 0.01, len(ranges))
-    return Scan(np.where(ranges < max_range, ranges, np.nan), angles, index, 0.5 * index)
+    return Scan(np.where(ranges < max_range, ranges, np.nan), angles, index, float(index))
 
 
 def tour(stops: Sequence[tuple[float, float]], step: float) -> Iterator[FloatArray]:

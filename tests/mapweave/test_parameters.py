@@ -80,6 +80,12 @@ MEASURED: dict[str, dict[str, object]] = {
     "PartParameters": {"length": 36.0},
     "PlaceRecognitionParameters": {},
     "PoseCovarianceParameters": {"noise": 0.1},
+    "ReachabilityParameters": {
+        "max_speed": 2.0,
+        "max_turn_rate": np.pi,
+        "slack": 0.25,
+        "turn_slack": 0.26,
+    },
     "SegmentConfidenceParameters": {"spacing": 0.2, "closeness": 0.3, "clearance": 0.3},
     "SegmentationParameters": {"max_range": 30.0, "tolerance": 0.04},
     "SelectionParameters": {"tolerance": 0.09},
