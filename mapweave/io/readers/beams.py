@@ -104,7 +104,7 @@ def stated_beams(start: float, field_of_view: float, resolution: float, count: i
 def _is_sound(start: float, resolution: float, count: int) -> bool:
     """Return whether beams ascend within one turn, and can be told apart."""
     span = resolution * (count - 1)
-    sound = abs(start) <= _TURN and resolution >= MIN_RESOLUTION  # False for NaN
+    sound = abs(start) <= _TURN and MIN_RESOLUTION <= resolution < math.inf  # False for NaN
     return sound and span <= _TURN + resolution
 
 

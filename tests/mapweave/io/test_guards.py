@@ -14,7 +14,8 @@ WHOLE = "FLASER 3 1.0 2.0 3.0 0 0 0 0 0 0 1.0 host 1.0\n"
 
 
 @pytest.mark.parametrize(
-    ("start", "resolution"), [(1e18, 0.01), (0.0, 1e-300), (0.0, 1e-17), (0.0, float("nan"))]
+    ("start", "resolution"),
+    [(1e18, 0.01), (0.0, 1e-300), (0.0, 1e-17), (0.0, float("nan")), (0.0, float("inf"))],
 )
 def test_beams_that_cannot_be_told_apart_are_damage(start: float, resolution: float) -> None:
     with pytest.raises(DamagedLineError):
