@@ -307,6 +307,43 @@ inline Out<float> mark_cells(In<double, 2> wall, In<double, 2> facing, In<double
   return give(std::move(sums), {3, static_cast<size_t>(rows), static_cast<size_t>(columns), 2});
 }
 
+// The sum of the products of grids (g, rows, columns, 2) of complex numbers with conjugates of others.
+inline Out<float> conjugate_products(In<float, 4> here, In<float, 4> there) {
+  for (int d = 0; d < 4; ++d)
+    if (here.shape(d) != there.shape(d) || here.shape(3) != 2)
+      throw std::invalid_argument("grids (g, rows, columns, 2) of one shape expected");
+  const size_t size = here.shape(1) * here.shape(2);
+  std::vector<float> sums(2 * size, 0.0f);
+  for (size_t g = 0; g < here.shape(0); ++g) {
+    const float *a = here.data() + 2 * size * g, *b = there.data() + 2 * size * g;
+    for (size_t k = 0; k < 2 * size; k += 2) {
+      sums[k] += a[k] * b[k] + a[k + 1] * b[k + 1];
+      sums[k + 1] += a[k + 1] * b[k] - a[k] * b[k + 1];
+    }
+  }
+  return give(std::move(sums), {here.shape(1), here.shape(2), 2});
+}
+
+// Numbers of the `count` highest real parts of (n, 2) complex numbers, the highest first; of equals the lower one.
+inline Out<int64_t> highest(In<float, 2> values, int64_t count) {
+  if (values.shape(1) != 2 || count < 0) throw std::invalid_argument("values (n, 2), count >= 0 expected");
+  const size_t kept = std::min(values.shape(0), static_cast<size_t>(count));
+  const auto better = [&](int64_t a, int64_t b) {
+    return values(a, 0) != values(b, 0) ? values(a, 0) > values(b, 0) : a < b;
+  };
+  std::vector<int64_t> best(kept);  // a heap with the worst of them at its top
+  std::iota(best.begin(), best.end(), 0);
+  std::make_heap(best.begin(), best.end(), better);
+  for (size_t k = kept; k < values.shape(0) && kept > 0; ++k) {
+    if (!(values(k, 0) > values(best.front(), 0))) continue;
+    std::pop_heap(best.begin(), best.end(), better);
+    best.back() = static_cast<int64_t>(k);
+    std::push_heap(best.begin(), best.end(), better);
+  }
+  std::sort(best.begin(), best.end(), better);
+  return give(std::move(best), {kept});
+}
+
 // Numbers of the best, each different from the better ones.
 inline Out<int64_t> distinct(In<double, 2> place, In<double, 1> turn, In<double, 1> scores, int64_t count,
                              double distance, double angle) {
@@ -346,6 +383,8 @@ inline void bind_proposals(nb::module_& m) {
   m.def("mark_cells", &proposals::mark_cells, nb::arg("wall"), nb::arg("facing"), nb::arg("metres"), nb::arg("near"),
         nb::arg("alike"), nb::arg("seen"), nb::arg("low"), nb::arg("cell"), nb::arg("rows"), nb::arg("columns"),
         nb::arg("part"), nb::arg("weight"), nb::arg("is_reference"));
+  m.def("conjugate_products", &proposals::conjugate_products, nb::arg("here"), nb::arg("there"));
+  m.def("highest", &proposals::highest, nb::arg("values"), nb::arg("count"));
   m.def("distinct", &proposals::distinct, nb::arg("place"), nb::arg("turn"), nb::arg("scores"), nb::arg("count"),
         nb::arg("distance"), nb::arg("angle"));
 }

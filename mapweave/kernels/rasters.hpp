@@ -2,7 +2,6 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -12,30 +11,32 @@ namespace rasters {
 
 constexpr int32_t kNone = -1;
 
-// The squared distance [cells] from each cell to the nearest seed, and that seed's cell: column by column, then the
-// lower envelope of each row's parabolas. Of seeds equally near, the one in the lower column, then the lower row.
+// The nearest seed to each cell and how far it is: column by column, then the lower envelope of each row's parabolas.
+// Of seeds equally near, the one in the lower column, then the lower row.
 class Distances {
  public:
   Distances(int32_t rows, int32_t columns)
-      : rows_(rows), columns_(columns), row_(size(), kNone), squared_(size()), seed_(size(), kNone) {}
+      : rows_(rows), columns_(columns), row_(static_cast<size_t>(rows) * columns, kNone), stack_(columns),
+        from_(columns), height_(columns) {}
 
-  template <typename IsSeed>
-  void fill(IsSeed is_seed) {
+  // Calls `tell(cell, columns from the seed, squared rows from it, seed's cell)`; nothing where there is no seed.
+  template <typename IsSeed, typename Tell>
+  void find(IsSeed is_seed, Tell tell) {
     down(is_seed);
     up();
-    stack_.resize(columns_);
-    from_.resize(columns_);
-    height_.resize(columns_);
-    for (int32_t i = 0; i < rows_; ++i) across(i);
+    for (int32_t i = 0; i < rows_; ++i) {
+      const int32_t count = across(i);
+      for (int32_t k = 0; k < count; ++k) {
+        const int32_t column = stack_[k], first = static_cast<int32_t>(from_[k]);
+        const int32_t last = k + 1 < count ? static_cast<int32_t>(from_[k + 1]) : columns_;
+        const size_t begin = static_cast<size_t>(i) * columns_;
+        tell(begin + first, static_cast<size_t>(last - first), first - column, height_[column],
+             static_cast<size_t>(row_[begin + column]) * columns_ + column);
+      }
+    }
   }
 
-  // [cells²]; of a raster without seeds, the largest number.
-  const std::vector<int64_t>& squared() const { return squared_; }
-  const std::vector<int32_t>& seed() const { return seed_; }
-
  private:
-  size_t size() const { return static_cast<size_t>(rows_) * columns_; }
-
   template <typename IsSeed>
   void down(IsSeed is_seed) {
     for (int32_t i = 0; i < rows_; ++i) {
@@ -56,7 +57,8 @@ class Distances {
     }
   }
 
-  void across(int32_t i) {
+  // How many columns of row `i` have cells to which their seed is nearest: `stack_`, each from `from_` on.
+  int32_t across(int32_t i) {
     const int32_t* row = row_.data() + static_cast<size_t>(i) * columns_;
     int32_t count = 0;
     for (int32_t j = 0; j < columns_; ++j) {
@@ -74,41 +76,32 @@ class Distances {
       stack_[count] = j;
       from_[count++] = begins;
     }
-    read_off(i, row, count);
+    return count;
   }
 
   // The first column from which on the seed of column `b` is nearer than that of column `a` before it.
   int64_t first_nearer(int32_t a, int32_t b) const {
-    const int64_t sum = static_cast<int64_t>(b) * b - static_cast<int64_t>(a) * a + height_[b] - height_[a];
+    const int64_t higher = height_[b] - height_[a];
+    if (b == a + 1 && higher == 0) return b;
+    const int64_t sum = static_cast<int64_t>(b) * b - static_cast<int64_t>(a) * a + higher;
     const int64_t twice = 2 * static_cast<int64_t>(b - a);
     // Exact: quotients of whole numbers so small are no nearer to a whole number than rounding moves them.
     return sum < 0 ? 0 : static_cast<int64_t>(static_cast<double>(sum) / static_cast<double>(twice)) + 1;
   }
 
-  void read_off(int32_t i, const int32_t* row, int32_t count) {
-    const size_t begin = static_cast<size_t>(i) * columns_;
-    if (count == 0) {
-      std::fill_n(squared_.begin() + begin, columns_, std::numeric_limits<int64_t>::max());
-      return;
-    }
-    for (int32_t k = 0; k < count; ++k) {
-      const int32_t column = stack_[k];
-      const int32_t last = k + 1 < count ? static_cast<int32_t>(from_[k + 1]) : columns_;
-      for (int32_t j = static_cast<int32_t>(from_[k]); j < last; ++j) {
-        const int64_t apart = j - column;
-        squared_[begin + j] = apart * apart + height_[column];
-        seed_[begin + j] = row[column] * columns_ + column;
-      }
-    }
-  }
-
   int32_t rows_, columns_;
-  std::vector<int32_t> row_;
-  std::vector<int64_t> squared_;
-  std::vector<int32_t> seed_;
+  std::vector<int32_t> row_;  // of the seed nearest in the column
   std::vector<int32_t> stack_;
   std::vector<int64_t> from_, height_;
 };
+
+// [m] for a run of cells of one row.
+inline void measure(float* metres, size_t count, int64_t off, int64_t height, double cell) {
+  for (size_t k = 0; k < count; ++k) {
+    const double apart = static_cast<double>(off) + static_cast<double>(k);
+    metres[k] = static_cast<float>(std::sqrt(apart * apart + static_cast<double>(height)) * cell);
+  }
+}
 
 inline int32_t side(int64_t cells, const char* message) {
   if (cells < 1 || cells > 1'000'000) throw std::invalid_argument(message);
@@ -134,14 +127,13 @@ inline std::pair<Out<int32_t>, Out<float>> nearest_samples(In<double, 2> points,
     if (!(x >= 0 && y >= 0 && x < r && y < c)) throw std::invalid_argument("points: inside of the raster expected");
     owner[static_cast<size_t>(x) * c + static_cast<size_t>(y)] = static_cast<int32_t>(k);
   }
-  Distances distances(r, c);
-  distances.fill([&](int32_t i, int32_t j) { return owner[static_cast<size_t>(i) * c + j] != kNone; });
   std::vector<int32_t> nearest(owner.size());
   std::vector<float> metres(owner.size());
-  for (size_t k = 0; k < owner.size(); ++k) {
-    nearest[k] = owner[distances.seed()[k]];
-    metres[k] = static_cast<float>(std::sqrt(static_cast<double>(distances.squared()[k])) * cell);
-  }
+  Distances(r, c).find([&, c = c](int32_t i, int32_t j) { return owner[static_cast<size_t>(i) * c + j] != kNone; },
+                       [&](size_t at, size_t count, int64_t off, int64_t height, size_t seed) {
+                         std::fill_n(nearest.begin() + at, count, owner[seed]);
+                         measure(metres.data() + at, count, off, height, cell);
+                       });
   return {give(std::move(nearest), {owner.size() / c, static_cast<size_t>(c)}),
           give(std::move(metres), {owner.size() / c, static_cast<size_t>(c)})};
 }
@@ -213,16 +205,18 @@ inline Out<float> depths(In<double, 2> corners, In<int64_t, 1> starts, In<double
                          int64_t columns) {
   const auto [r, c] = sides(rows, columns);
   const std::vector<uint8_t> filled = fill(corners, starts, origin, cell, r, c);
-  Distances distances(r + 2, c + 2);
-  distances.fill([&, r = r, c = c](int32_t i, int32_t j) {
-    return i == 0 || j == 0 || i > r || j > c || !filled[static_cast<size_t>(i - 1) * c + (j - 1)];
-  });
+  std::vector<float> padded(static_cast<size_t>(r + 2) * (c + 2));
+  Distances(r + 2, c + 2).find(
+      [&, r = r, c = c](int32_t i, int32_t j) {
+        return i == 0 || j == 0 || i > r || j > c || !filled[static_cast<size_t>(i - 1) * c + (j - 1)];
+      },
+      [&](size_t at, size_t count, int64_t off, int64_t height, size_t) {
+        measure(padded.data() + at, count, off, height, cell);
+      });
   std::vector<float> depth(filled.size());
   for (int32_t i = 0; i < r; ++i)
-    for (int32_t j = 0; j < c; ++j) {
-      const int64_t squared = distances.squared()[static_cast<size_t>(i + 1) * (c + 2) + (j + 1)];
-      depth[static_cast<size_t>(i) * c + j] = static_cast<float>(std::sqrt(static_cast<double>(squared)) * cell);
-    }
+    std::copy_n(padded.begin() + static_cast<size_t>(i + 1) * (c + 2) + 1, c,
+                depth.begin() + static_cast<size_t>(i) * c);
   return give(std::move(depth), {static_cast<size_t>(r), static_cast<size_t>(c)});
 }
 

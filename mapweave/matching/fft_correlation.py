@@ -22,7 +22,13 @@ import scipy
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray
-from mapweave.kernels.matching.marks import Complex64Array, Places, mark_cells
+from mapweave.kernels.matching.marks import (
+    Complex64Array,
+    Places,
+    conjugate_products,
+    highest,
+    mark_cells,
+)
 from mapweave.matching.distance_field import DistanceField
 from mapweave.parameters import StageParameters, derived
 
@@ -125,38 +131,42 @@ def correlate(
         scipy.fft.next_fast_len(int(span[1] / cell) + 2),
     )
     low, weight = reference.low, weight / 2
-    here = scipy.fft.fft2(_cells(reference, low, cell, shape, weight, True))
+    here = _spectra(reference, cell, shape, weight, True)
     found = []
     for turn, marks in zip(turns, turned, strict=True):
-        there = scipy.fft.fft2(_cells(marks, marks.low, cell, shape, weight, False))
-        spectrum = (here * there.conj()).sum(axis=0)
-        shift = _best_shifts(scipy.fft.ifft2(spectrum).real, reference.span / cell, p.shifts)
+        there = _spectra(marks, cell, shape, weight, False)
+        score = scipy.fft.ifft2(conjugate_products(here, there), overwrite_x=True)
+        shift = _best_shifts(score, reference.span / cell, p.shifts)
         place = low - marks.low + cell * shift
         found.append(np.column_stack([place, np.full(len(place), turn)]))
     return np.concatenate(found)
 
 
-def _best_shifts(score: FloatArray, size: FloatArray, count: int) -> FloatArray:
+def _best_shifts(score: Complex64Array, size: FloatArray, count: int) -> FloatArray:
     """(count, 2) shifts [cells] of the highest score, fewer where there are not as many cells.
 
     Those beyond `size` (2,) are negative.
     """
-    count = min(count, score.size)
-    best = np.argpartition(score, -count, axis=None)[-count:]
+    best = highest(score, count)
     shift = np.column_stack(np.unravel_index(best, score.shape)).astype(np.float64)
     return np.where(shift > size + 1, shift - score.shape, shift)
 
 
-def _cells(
-    marks: Marks, low: FloatArray, cell: float, shape: tuple[int, int], weight: float, first: bool
+def _spectra(
+    marks: Marks, cell: float, shape: tuple[int, int], weight: float, first: bool
 ) -> Complex64Array:
-    """(3, rows, columns) of `shape`: what `marks` put into cells from the corner `low` (2,) [m].
+    """(3, rows, columns) of `shape`: the spectra of what `marks` put into cells from their corner.
 
     A metre of wall counts an eighth where it is near wall, whichever way it faces, so that both
     ways give the quarter; the rest hangs on the normals. Less `weight` where it was seen through.
+    Only the cells that the map reaches are laid out: the others are empty.
     """
     places = Places(marks.wall, marks.facing, marks.metres, marks.near, marks.alike, marks.seen)
-    return mark_cells(places, low, cell, shape, marks.area / cell**2, weight, first)
+    used = (int(marks.span[0] / cell) + 1, int(marks.span[1] / cell) + 1)
+    cells = mark_cells(places, marks.low, cell, used, marks.area / cell**2, weight, first)
+    along = scipy.fft.fft(cells, shape[1], axis=2)
+    spectra: Complex64Array = scipy.fft.fft(along, shape[0], axis=1)
+    return spectra
 
 
 def _complex(vectors: FloatArray) -> ComplexArray:

@@ -100,6 +100,37 @@ def mark_cells(
     return cast("Complex64Array", sums.view(np.complex64)[..., 0])
 
 
+def conjugate_products_numpy(here: Complex64Array, there: Complex64Array) -> Complex64Array:
+    """Twin of `conjugate_products`."""
+    return np.asarray((here * there.conj()).sum(axis=0), dtype=np.complex64)
+
+
+def conjugate_products(here: Complex64Array, there: Complex64Array) -> Complex64Array:
+    """Return (rows, columns) sums of the products of grids (g, ...) with conjugates of others."""
+    if COMPILED is None:
+        return conjugate_products_numpy(here, there)
+    sums = COMPILED.conjugate_products(_as_pairs(here), _as_pairs(there))
+    return cast("Complex64Array", sums.view(np.complex64)[..., 0])
+
+
+def highest_numpy(values: Complex64Array, count: int) -> NDArray[np.int64]:
+    """Twin of `highest`."""
+    return np.argsort(-values.real.ravel(), kind="stable")[:count].astype(np.int64)
+
+
+def highest(values: Complex64Array, count: int) -> NDArray[np.int64]:
+    """Return (count,) flat numbers of the highest real parts, the highest first, or all."""
+    if COMPILED is None:
+        return highest_numpy(values, count)
+    return cast("NDArray[np.int64]", COMPILED.highest(_as_pairs(values.ravel()), count))
+
+
+def _as_pairs(values: Complex64Array) -> NDArray[np.float32]:
+    """(..., 2) real and imaginary parts."""
+    pairs = np.ascontiguousarray(values).view(np.float32)
+    return pairs.reshape(*values.shape, 2)
+
+
 def _cells(
     places: ComplexArray, low: FloatArray, cell: float, shape: tuple[int, int]
 ) -> NDArray[np.int64]:

@@ -159,3 +159,18 @@ def test_lengths_that_do_not_agree_are_told() -> None:
     for align in (raster_icp.align_on_raster, raster_icp.align_on_raster_numpy):
         with pytest.raises(ValueError, match="expected"):
             align(*asked, ORIGIN, CELL, 0.7, 0.3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, some, st.sampled_from([0, 1, 20, 10_000]))
+def test_grids_are_correlated_alike(seed: int, rows: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    parts = rng.integers(-3, 4, (4, 3, rows, 7)).astype(
+        np.float32
+    )  # whole: exact, equals among them
+    here, there = (parts[:2] + 1j * parts[2:]).astype(np.complex64)
+    product = marks.conjugate_products(here, there)
+    np.testing.assert_array_equal(product, marks.conjugate_products_numpy(here, there))
+    np.testing.assert_array_equal(
+        marks.highest(product, count), marks.highest_numpy(product, count)
+    )
