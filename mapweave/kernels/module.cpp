@@ -6,6 +6,7 @@
 #include "denials.hpp"
 #include "evidence.hpp"
 #include "main_directions.hpp"
+#include "marks.hpp"
 #include "merging.hpp"
 #include "multiview.hpp"
 #include "point_map.hpp"
@@ -28,6 +29,7 @@ NB_MODULE(_compiled, m) {
   bind_denials(m);
   bind_evidence(m);
   bind_main_directions(m);
+  bind_marks(m);
   bind_merging(m);
   bind_multiview(m);
   bind_point_map(m);
