@@ -18,6 +18,7 @@ from mapweave.fusion.confidence import ConfidenceParameters, confidence
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
 from mapweave.fusion.parts import PartParameters, agreed, cut
+from mapweave.fusion.rooms import RoomParameters, outside
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
@@ -33,7 +34,10 @@ from mapweave.reasons import Reason, ReasonKind
 class FusionParameters(StageParameters):
     """One model for each stage."""
 
-    raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)
+    # Who stays longer in a room is not surer of which room it is.
+    raster: DistanceFieldParameters = derived(
+        lambda c: DistanceFieldParameters.of(c, same_wall=0.5)
+    )
     hypotheses: HypothesisParameters = derived(HypothesisParameters.of)
     # Right transforms contradict next to nothing, wrong ones a metre in ten: at a weight of 5 the
     # right one scored highest for every pair of stretches with 10 m and more in common.
@@ -48,6 +52,7 @@ class FusionParameters(StageParameters):
     icp_samples: int = Field(250, ge=10, description="of a map's walls, aligning hypotheses")
     loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
     confidence: ConfidenceParameters = ConfidenceParameters()
+    rooms: RoomParameters = RoomParameters()
     parts: PartParameters = derived(PartParameters.of)
     decision: DecisionParameters = derived(DecisionParameters.of)
     reach: ExtrapolationParameters = ExtrapolationParameters()
@@ -182,7 +187,10 @@ def compare(
         return _no_alignment(a, b, Reason(ReasonKind.NO_SHAPE))
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
-    decision, cause = decide(best, rival, sure, p.decision)
+    beyond = outside(first.raster, second.raster, best.transform, p.verification, p.rooms)
+    one_room = beyond < p.rooms.min_outside
+    sure *= p.rooms.unique if one_room else 1.0
+    decision, cause = decide(best, rival, sure, p.decision, beyond if one_room else None)
     return Alignment(
         a,
         b,

@@ -85,9 +85,16 @@ class Hypothesis:
 
 
 def decide(
-    best: Hypothesis, rival: Hypothesis | None, sure: float, p: DecisionParameters
+    best: Hypothesis,
+    rival: Hypothesis | None,
+    sure: float,
+    p: DecisionParameters,
+    outside: float | None = None,
 ) -> tuple[Decision, Reason]:
-    """Return the decision and its reason; `sure` is the confidence."""
+    """Return the decision and its reason; `sure` is the confidence.
+
+    Where all that is shared lies within one room, `outside` is what little does not [m].
+    """
     v = best.verdict
     match = {"common": v.common, "contradicted": v.contradicted}
     if v.common < p.min_common:
@@ -103,6 +110,9 @@ def decide(
     # Of a rival that shares next to nothing there is nothing to tell.
     next_best = {} if rival is None or rival.verdict.common < 1 else _against(best, rival)
     lead = v.score - (max(rival.verdict.score, 0.0) if rival else 0.0)
+    if outside is not None:
+        numbers = {**match, "outside": outside, "confidence": sure}
+        return "ambiguous", Reason(ReasonKind.ONE_ROOM, numbers)
     if sure < p.min_confidence or lead < p.min_lead:
         return "ambiguous", Reason(ReasonKind.UNSURE, {**match, **next_best, "confidence": sure})
     return "accepted", Reason(ReasonKind.CONVINCING, {**match, **next_best})

@@ -4,6 +4,7 @@
 #include "clearing.hpp"
 #include "correlative.hpp"
 #include "denials.hpp"
+#include "density.hpp"
 #include "evidence.hpp"
 #include "main_directions.hpp"
 #include "marks.hpp"
@@ -27,6 +28,7 @@ NB_MODULE(_compiled, m) {
   bind_clearing(m);
   bind_correlative(m);
   bind_denials(m);
+  bind_density(m);
   bind_evidence(m);
   bind_main_directions(m);
   bind_marks(m);

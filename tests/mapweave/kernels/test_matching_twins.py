@@ -9,6 +9,7 @@ from mapweave.kernels.arrays import FloatArray
 from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.matching import (
     corners,
+    density,
     distinct,
     judging,
     marks,
@@ -60,6 +61,14 @@ def test_the_nearest_samples_are_as_far(seed: int, count: int, shape: tuple[int,
     for owner in (nearest, twin):
         away = np.hypot(*np.moveaxis(cells[owner] - here, -1, 0)) * CELL
         np.testing.assert_allclose(away, distance, rtol=1e-6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, st.sampled_from([0.05, 0.5, 3.0]))
+def test_wall_is_drawn_as_often(seed: int, count: int, radius: float) -> None:
+    rng = np.random.default_rng(seed)
+    asked = some_places(rng, count), units(rng, count), rng.uniform(0, 1, count), radius, 0.8
+    same(density.times_drawn(*asked), density.times_drawn_numpy(*asked))
 
 
 @settings(max_examples=40, deadline=None)
