@@ -19,9 +19,9 @@ class ConfidenceParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    intercept: float = Field(-10.4, description="log odds where all features are 0")
-    score: float = Field(3.62, description="for ln(1 + metres in common less those contradicted)")
-    held: float = Field(1.66, description="for ln(1 + metres that hold the weakest direction)")
+    intercept: float = Field(-12.2, description="log odds where all features are 0")
+    score: float = Field(4.45, description="for ln(1 + metres in common less those contradicted)")
+    held: float = Field(1.64, description="for ln(1 + metres that hold the weakest direction)")
     rivalry: float = Field(
         12.0,
         gt=0,

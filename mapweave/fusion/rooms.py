@@ -8,17 +8,18 @@ import math
 
 import numpy as np
 import scipy
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import VerificationParameters, coinciding
-from mapweave.parameters import StageParameters
 
 
-class RoomParameters(StageParameters):
+class RoomParameters(BaseModel):
     """What a room is, and what one room alone proves."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     passage: float = Field(
         0.5,
@@ -28,7 +29,10 @@ class RoomParameters(StageParameters):
     )
     coarse: int = Field(2, ge=1, description="cells of the raster in one that rooms are told by")
     max_extent: float = Field(
-        12.0, gt=0, description="[m] a longer one is a corridor or a hall, with doors and corners"
+        9.0,
+        gt=0,
+        description="[m] a longer one is a corridor, a hall or a laboratory such as those of Intel,"
+        " of 10 to 12 m, and seldom built twice; offices, classrooms and rooms of hotels are not",
     )
     min_outside: float = Field(
         4.0, ge=0, description="[m] of wall in common outside of the room that tell which it is"
@@ -47,8 +51,9 @@ def outside(
 ) -> float:
     """Return the metres of wall in common that lie outside of one room.
 
-    Infinite where what most of it is in is no room, but a corridor or a hall. Of what the two maps
-    say, the less counts: one of them may not have seen the door.
+    Infinite where what most of it is in is no room, but a corridor or a hall, by either map: the
+    other may have seen a part of it. Otherwise the less counts, for one of them may have seen more
+    through the door.
 
     Parameters
     ----------
@@ -58,10 +63,11 @@ def outside(
         (3,) from `other` to `reference` [m, m, rad].
     """
     p, back = parameters, se2.inverse(transform)
-    return min(
+    both = (
         _outside(reference, other, transform, verification, p),
         _outside(other, reference, back, verification, p),
     )
+    return math.inf if math.inf in both else min(both)
 
 
 def _outside(
@@ -91,19 +97,28 @@ def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArr
     """Return (rows, columns) the number of the room nearest to each coarse cell; (k,) extents [m].
 
     Rooms are what free space falls apart into where passages are closed that are no wider than a
-    door; an extent is the longer side of the box about one.
+    door; an extent is the longer side of one, by how far it spreads.
     """
     rows, columns = (n // p.coarse for n in raster.depth.shape)
     cut = raster.depth[: rows * p.coarse, : columns * p.coarse]
     depth = cut.reshape(rows, p.coarse, columns, p.coarse).max(axis=(1, 3))
-    label, count = scipy.ndimage.label(depth > p.passage, np.ones((3, 3)))
+    found, count = scipy.ndimage.label(depth > p.passage, np.ones((3, 3)))
+    label = np.asarray(found, dtype=np.int64)
     if count == 0:
         return np.zeros((rows, columns), dtype=np.int64), np.empty(0)
     away = scipy.ndimage.distance_transform_edt(
         label == 0, return_distances=False, return_indices=True
     )
-    boxes = scipy.ndimage.find_objects(label)
-    sides = np.array([[s.stop - s.start for s in box] for box in boxes])
-    core = 2 * p.passage  # which a room is larger by than what is left of it
-    extents = sides.max(axis=1) * p.coarse * raster.cell + core
-    return label[tuple(away)] - 1, np.asarray(extents, dtype=np.float64)
+    return label[tuple(away)] - 1, _extents(label, count) * p.coarse * raster.cell + 2 * p.passage
+
+
+def _extents(label: IntArray, count: int) -> FloatArray:
+    """(count,) the longer sides of the rectangles that spread as the parts of `label` do [cells]."""
+    i, j = np.nonzero(label)
+    part = label[i, j] - 1
+    area = np.bincount(part, minlength=count)
+    mean = [np.bincount(part, x, count) / area for x in (i, j)]
+    u, v = i - mean[0][part], j - mean[1][part]
+    uu, vv, uv = (np.bincount(part, x, count) / area for x in (u * u, v * v, u * v))
+    greatest = (uu + vv) / 2 + np.hypot((uu - vv) / 2, uv)
+    return np.asarray(np.sqrt(12 * greatest), dtype=np.float64)

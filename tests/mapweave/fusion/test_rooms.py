@@ -97,6 +97,15 @@ def test_what_lies_outside_is_counted_from_both_maps() -> None:
     assert outside(two.raster, two.raster, *asked) > P.rooms.min_outside
 
 
+def test_a_part_of_what_the_other_knows_to_be_a_corridor_is_no_room() -> None:
+    hall, piece = prepare(part(BUILDING, 0, 30), P), prepare(part(BUILDING, 5, 12), P)
+    assert hall is not None
+    assert piece is not None
+    asked = se2.IDENTITY, P.verification, P.rooms
+    assert outside(piece.raster, piece.raster, *asked) < math.inf
+    assert outside(hall.raster, piece.raster, *asked) == math.inf
+
+
 def test_a_corridor_is_no_room_of_common_shape() -> None:
     hall = prepare(part(BUILDING, 0, 30), P)
     assert hall is not None
