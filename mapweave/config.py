@@ -214,7 +214,7 @@ class Config(_Checked):
 
     @classmethod
     def load(
-        cls, file: Path | None = None, environ: abc.Mapping[str, str] | None = None
+        cls, file: str | Path | None = None, environ: abc.Mapping[str, str] | None = None
     ) -> "Config":
         """Return what a file and the environment make of the defaults.
 
@@ -234,7 +234,7 @@ class Config(_Checked):
         """
         given: dict[str, _Given] = {}
         if file is not None:
-            given.update(_in_file(file))
+            given.update(_in_file(Path(file)))
         given.update(_in_environment(environ or {}))
         sections = {}
         for section, model in _sections().items():

@@ -14,12 +14,14 @@ from functools import cached_property
 import numpy as np
 from pydantic import Field
 
+from mapweave.config import Config
 from mapweave.fusion.confidence import ConfidenceParameters, confidence
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
 from mapweave.fusion.parts import PartParameters, agreed, cut
 from mapweave.fusion.rooms import RoomParameters, outside
 from mapweave.geometry import se2
+from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import Alignment, LineMap, RobotMap, component_name
@@ -60,7 +62,10 @@ class FusionParameters(StageParameters):
 
 
 def align(
-    reference: RobotMap, other: RobotMap, parameters: FusionParameters | None = None
+    reference: RobotMap,
+    other: RobotMap,
+    parameters: FusionParameters | None = None,
+    config: Config | None = None,
 ) -> list[Alignment]:
     """Compare every component of `reference` with every one of `other` (paper, VIII).
 
@@ -69,7 +74,9 @@ def align(
     reference, other
         Maps of two robots, which need share nothing.
     parameters
-        Of each stage.
+        Of each stage; those that derive from `config` by default.
+    config
+        What both maps were made with; by default the default one.
 
     Returns
     -------
@@ -77,14 +84,31 @@ def align(
         One for each pair of components, accepted, ambiguous or refused: each says how sure it is,
         and why.
 
+    Raises
+    ------
+    ArgumentError
+        If one of them is no such thing.
+
     Examples
     --------
     >>> align(RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ()))  # nothing in them
     []
     """
-    p = parameters or FusionParameters()
+    for name, value in (("reference", reference), ("other", other)):
+        check_kind(name, value, RobotMap)
+    p = _parameters(parameters, config)
     ours, theirs = ([_Component(m, c, p) for c in m.components] for m in (reference, other))
     return [_align(a, b, p) for a, b in itertools.product(ours, theirs)]
+
+
+def _parameters(parameters: FusionParameters | None, config: Config | None) -> FusionParameters:
+    """Return `parameters`, or else those that derive from `config`; ArgumentError if neither is."""
+    if parameters is not None:
+        check_kind("parameters", parameters, FusionParameters)
+        return parameters
+    config = Config() if config is None else config
+    check_kind("config", config, Config)
+    return FusionParameters.of(config)
 
 
 class _Component:

@@ -18,6 +18,7 @@ from pydantic import ValidationError
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError
 from mapweave.evidence import RunnerUp
+from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.io.map_schema import JOINT_FORMAT, MAP_FORMAT, HeaderFile, JointFile, MapFile
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
@@ -99,7 +100,10 @@ def save(some_map: RobotMap | JointMap, path: str | Path) -> None:
     ------
     FileError
         If it cannot be written.
+    ArgumentError
+        If it is no map.
     """
+    check_kind("some_map", some_map, RobotMap, JointMap)
     if isinstance(some_map, RobotMap):
         write_map(path, some_map)
     else:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from mapweave.config import Config
 from mapweave.errors import ArgumentError, FinishedError
 from mapweave.geometry import se2
+from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
@@ -98,7 +99,8 @@ class Mapper:
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
-        config = config or Config()
+        config = Config() if config is None else config
+        check_kind("config", config, Config)
         self.parameters = parameters or MapperParameters.of(config)
         known = self.parameters == MapperParameters.of(config)
         self._made_with = MadeWith.of(config) if known else None
@@ -135,8 +137,9 @@ class Mapper:
         FinishedError
             After `finish`.
         ArgumentError
-            If its index is not above that of the scan before it.
+            If it is no scan, or its index is not above that of the scan before it.
         """
+        check_kind("scan", scan, Scan)
         seen = observe(self._numbered(scan), self.parameters.observation)
         finished = len(self._finished)
         lost = False

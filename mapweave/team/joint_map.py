@@ -1,7 +1,7 @@
 """The joint map: components aligned along accepted alignments, and merged (paper, VI to VIII)."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from mapweave.config import Config
 from mapweave.errors import ArgumentError
 from mapweave.fusion.align import FusionParameters, align
+from mapweave.geometry.arguments import as_list, check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.lines.merging import MergingParameters, evolve
@@ -53,8 +54,8 @@ class JointParameters(StageParameters):
 
 
 def fuse(
-    maps: Sequence[RobotMap],
-    alignments: Sequence[Alignment] | None = None,
+    maps: Iterable[RobotMap],
+    alignments: Iterable[Alignment] | None = None,
     config: Config | None = None,
 ) -> JointMap:
     """Return the joint map of robots whose maps are complete: nothing grows any more.
@@ -77,19 +78,23 @@ def fuse(
     Raises
     ------
     ArgumentError
-        If two maps are of one robot, or an alignment names a component that no map has.
+        If two maps are of one robot, an alignment names a component that no map has, or anything
+        is not of its kind.
 
     Examples
     --------
     >>> fuse([RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ())]).components
     ()
     """
-    config = config or Config()
+    config = Config() if config is None else config
+    check_kind("config", config, Config)
+    maps = as_list("maps", maps, RobotMap)
     _check_robots(maps)
     if alignments is None:
         pairs = itertools.combinations(maps, 2)
         p = FusionParameters.of(config)
         alignments = [a for first, second in pairs for a in align(first, second, p)]
+    alignments = as_list("alignments", alignments, Alignment)
     _check_components(maps, alignments)
     # Nothing grows any more, and there is no next time.
     weaver = JointOptimizer(JointOptimizationParameters.of(config, newest=True, at_once=1_000_000))

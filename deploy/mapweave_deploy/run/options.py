@@ -102,17 +102,18 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
 
 
 def _natural(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise ValueError(f"{text}: expected 0 or more")
-    return value
+    return _whole(text, 0)
 
 
 def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise ValueError(f"{text}: expected 1 or more")
-    return value
+    return _whole(text, 1)
+
+
+def _whole(text: str, least: int) -> int:
+    """Return the number that `text` is; ValueError unless it is whole, and `least` or more."""
+    if not (text.isascii() and text.isdigit() and len(text) <= 9 and int(text) >= least):
+        raise ValueError(f"{text!r}: expected a whole number, {least} or more")
+    return int(text)
 
 
 def _rate(text: str) -> str:

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import zenoh
 
+from mapweave.geometry.arguments import as_positive
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.asking import ask_joint_maps, ask_latest
@@ -56,9 +57,9 @@ def joint_maps(
     team
         The team's id.
     connect
-        Endpoints of the router; by default ``MAPWEAVE_CONNECT`` or this machine.
+        Endpoints of the router, or one; by default ``MAPWEAVE_CONNECT`` or this machine.
     timeout
-        End after this time without a new one [s]; None never ends.
+        End after this time without a new one [s], above 0; None never ends.
     stopping
         Asked now and then: where it says so, end.
 
@@ -68,6 +69,8 @@ def joint_maps(
         If `team` is not an id.
     EndpointError
         If an endpoint is not one.
+    ArgumentError
+        If `timeout` is not above 0.
     UnreachableError
         If no router answers within `timeout`.
     """
@@ -122,6 +125,8 @@ def _listening(
     key: str, connect: Sequence[str] | None, timeout: float | None, history: int
 ) -> Iterator[tuple[zenoh.Session, Inbox]]:
     """Open a session and an inbox for what is published at `key`."""
+    if timeout is not None:
+        as_positive("timeout", timeout, "s")
     inbox = Inbox()
     with (
         open_session(connect, patience=timeout) as session,

@@ -128,7 +128,16 @@ def test_a_team_out_of_time_says_who_is_not_done(tmp_path: Path) -> None:
         (["--world", "office", "some.log"], 2, r"(?s).*expected either logs or --world\n"),
         ([], 2, r"(?s).*expected either logs or --world\n"),
         (["--world", "moon"], 2, r"(?s).*invalid choice: 'moon'.*\n"),
-        (["--world", "arena", "--robots", "0"], 2, r"(?s).*expected 1 or more\n"),
+        (
+            ["--world", "arena", "--robots", "0"],
+            2,
+            r"(?s).*'0': expected a whole number, 1 or more\n",
+        ),
+        (
+            ["--world", "arena", "--seed", "x"],
+            2,
+            r"(?s).*'x': expected a whole number, 0 or more\n",
+        ),
         (["--world", "arena", "--team", "A/B"], 1, r"mapweave: team 'A/B': expected .*\n"),
         (["--world", "arena", "--rate", "fast"], 2, r"(?s).*--rate.*'fast'.*\n"),
     ],
