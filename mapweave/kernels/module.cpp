@@ -20,6 +20,7 @@
 #include "segmentation.hpp"
 #include "slivers.hpp"
 #include "viewpoints.hpp"
+#include "windows.hpp"
 
 namespace nb = nanobind;
 
@@ -44,4 +45,5 @@ NB_MODULE(_compiled, m) {
   bind_segmentation(m);
   bind_slivers(m);
   bind_viewpoints(m);
+  bind_windows(m);
 }

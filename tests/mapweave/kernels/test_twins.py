@@ -62,10 +62,12 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
     np.testing.assert_array_equal(
         compiled.explains(*asked, poses, 0.5), twin.explains(*asked, poses, 0.5)
     )
-    clear, every = rng.uniform(0, 9, 50), int(rng.integers(1, 4))
+    beams, every = int(rng.choice([1, 50, 360])), int(rng.integers(1, 4))
+    clear = rng.uniform(0, 9) + rng.uniform(0, rng.choice([0.1, 3.0]), beams)
+    spacing = 2 * np.pi / 360 if beams == 360 else 0.06
 
     def shares(points: PointMap) -> FloatArray:
-        return points.seen_through(clear, -1.5, 0.06, poses, 0.3, 3.0, 6.0, 0.7, every)
+        return points.seen_through(clear, -1.5, spacing, poses, 0.3, 3.0, 6.0, 0.7, every)
 
     np.testing.assert_allclose(shares(compiled), shares(twin))
 
