@@ -16,6 +16,7 @@ from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameter
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_protocol.link import session
 from mapweave_protocol.link.asking import request_all_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
@@ -49,6 +50,8 @@ class Service:
         Of the coordinator.
     config
         Of how maps become one; the default one where none is given.
+    feed
+        Is handed every version, and every second how robots and coordinator are.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class Service:
         store: Store,
         parameters: CoordinatorParameters,
         config: Config | None = None,
+        feed: Feed | None = None,
     ) -> None:
         self._session = zenoh_session
         self._team = team
@@ -77,6 +81,9 @@ class Service:
         self._boot = keys.new_boot()
         self._status_due = 0.0
         self._builder = VersionBuilder(store.series, config or Config())
+        self._started = time.time()
+        self._feed = feed or Feed()
+        self._feed.show_version(store.latest_version, self._coordinator.maps)
 
     def run(self, stopping: Callable[[], bool]) -> None:
         """Serve until `stopping`; then publish what is pending.
@@ -135,6 +142,7 @@ class Service:
             self._publisher.put(built.payload)
             self._frames = frames_of(built.joint)
             self._status_due = 0.0  # robots wait for their new frames
+            self._feed.show_version(built.draft.version, built.draft.maps)
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
 
@@ -157,6 +165,16 @@ class Service:
             frames=self._frames,
         )
         self._statuses.put(encode(status))
+        self._feed.show_team(
+            self._intake.reports,
+            CoordinatorReport(
+                boot=self._boot,
+                started=self._started,
+                stamp=status.stamp,
+                pending=status.pending,
+                refused=self._intake.refused,
+            ),
+        )
 
     @contextmanager
     def _announced(self) -> Iterator[None]:
