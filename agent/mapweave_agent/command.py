@@ -109,7 +109,7 @@ def _run(options: argparse.Namespace) -> int:
         BackendProcess(mapping.backend) as backend,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        mapper = Mapper(robot, new_boot(), mapping, backend, config)
+        mapper = Mapper(robot, new_boot(), mapping, backend, config, _log.warning)
         parameters = AgentParameters(map_interval=options.map_interval)
         past = earlier.young(options.resume_within)
         first = earlier.first_component(session, team, robot)
