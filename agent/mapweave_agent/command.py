@@ -112,7 +112,9 @@ def _run(options: argparse.Namespace) -> int:
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
         live = source.live and not math.isinf(options.rate)
-        mapper = Mapper(robot, new_boot(), mapping, backend, config, live=live)
+        mapper = Mapper(
+            robot, new_boot(), mapping, backend, config, live=live, on_warning=_log.warning
+        )
         parameters = AgentParameters(map_interval=options.map_interval)
         past = earlier.young(options.resume_within)
         first = earlier.first_component(session, team, robot)

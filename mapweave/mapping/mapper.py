@@ -5,6 +5,8 @@ nowhere waits; when several in a row fit nowhere or are blind, the robot is lost
 component.
 """
 
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from mapweave.config import Config
@@ -27,12 +29,16 @@ from mapweave.mapping.tracking.pose_covariance import (
 from mapweave.mapping.tracking.tracker import Found, Tracker, TrackerParameters
 from mapweave.maps import LineMap, MadeWith, RobotMap, Submap
 from mapweave.parameters import StageParameters, derived
+from mapweave.scan.own_body import OwnBody, OwnBodyParameters
 from mapweave.scan.scan import UNNUMBERED, Scan
+
+SUSPENSE = 24  # times the patience, while it is open whether a robot sees itself
 
 
 class MapperParameters(StageParameters):
     """One model for each stage."""
 
+    own_body: OwnBodyParameters = derived(OwnBodyParameters.of)
     observation: ObservationParameters = derived(ObservationParameters.of)
     tracker: TrackerParameters = derived(TrackerParameters.of)
     uncertainty: PoseCovarianceParameters = derived(PoseCovarianceParameters.of)
@@ -98,6 +104,8 @@ class Mapper:
     live
         Whether no scan may wait for the backend: a submap grows on while the one before it is
         being settled. The map then depends on how fast that is.
+    on_warning
+        Told in words what is odd about the scans, once: that the robot sees itself.
     """
 
     def __init__(
@@ -109,6 +117,7 @@ class Mapper:
         config: Config | None = None,
         *,
         live: bool = False,
+        on_warning: Callable[[str], None] | None = None,
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
@@ -120,6 +129,10 @@ class Mapper:
         self._version = 0
         self._finished: list[Submap] = []
         self._component = self._newest_component = 0
+        self._on_warning = on_warning
+        self._body = OwnBody(self.parameters.own_body)
+        # Raw scans so far, as long as no submap is finished.
+        self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._tracker = Tracker(self.parameters.tracker)
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
@@ -154,14 +167,11 @@ class Mapper:
             If it is no scan, or its index is not above that of the scan before it.
         """
         check_kind("scan", scan, Scan)
-        seen = observe(self._numbered(scan), self.parameters.observation)
+        scan = self._numbered(scan)
         finished = len(self._finished)
-        lost = False
-        placed = self._place(seen)
-        if len(self._tracker.missed) >= self.parameters.patience:
-            self._start_again()
-            lost = True
-            placed = seen.scan.index in self._merged
+        if self._body.watch(scan):
+            self._judge_again()
+        placed, lost = self._take(scan)
         pose, uncertainty = self._whereabouts() if placed else (None, None)
         submap_finished = len(self._finished) > finished
         return Placement(placed, self._component, submap_finished, lost, pose, uncertainty)
@@ -211,6 +221,55 @@ class Mapper:
             )
         self._next_index = index + 1
         return replace(scan, index=index) if scan.index == UNNUMBERED else scan
+
+    def _take(self, scan: Scan) -> tuple[bool, bool]:
+        """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
+        if not self._finished:
+            self._early.append(scan)
+        seen = observe(self._body.without(scan), self.parameters.observation)
+        placed = self._place(seen)
+        if len(self._tracker.missed) < self._patience(seen):
+            return placed, False
+        self._start_again()
+        return scan.index in self._merged, True
+
+    def _patience(self, seen: Observation) -> int:
+        """How many scans may be missed: more until it is known whether the robot sees itself.
+
+        Not where it sees nothing: what it sees of itself is not what it was lost by.
+        """
+        undecided = not self._finished and self._body.is_suspected
+        undecided &= not self._tracker.is_blind(seen)
+        return self.parameters.patience * (SUSPENSE if undecided else 1)
+
+    def _judge_again(self) -> None:
+        """Map all there is once more, as it is now known what of it is the robot's own body.
+
+        What is in a finished submap stays as it is.
+        """
+        self._say_body()
+        if self._finished:
+            return
+        early = list(self._early)
+        self._early.clear()
+        self._tracker = Tracker(self.parameters.tracker)
+        self._growing = SubmapBuilder(self.parameters.backend.submap)
+        self._origin = self._frame = se2.IDENTITY
+        self._merged = {}
+        self._version += 1
+        for scan in early:
+            self._take(scan)
+
+    def _say_body(self) -> None:
+        """Tell once that the robot sees itself."""
+        if self._on_warning is None or not self._body.reach.any():
+            return
+        wide, far = self._body.extent
+        self._on_warning(
+            f"{self.robot} sees itself: {wide:.0f}° of its field of view, up to {far:.2f} m away,"
+            " keep their place while all else moves; what is there is left out"
+        )
+        self._on_warning = None
 
     def _place(self, seen: Observation) -> bool:
         """Follow the robot to a scan; merge it, and those missed before it."""
