@@ -222,9 +222,8 @@ def compare(
     found = _by_walls(a, first, b, second, p) if possible is None else None
     if isinstance(found, Alignment):
         return found
-    return _decided(
-        a, b, find_alignments(first, second, p, possible if found is None else found), p
-    )
+    ranked = find_alignments(first, second, p, possible if found is None else found)
+    return _decided(a, first, b, second, ranked, p)
 
 
 def _by_walls(
@@ -238,13 +237,21 @@ def _by_walls(
     shifted, most = propose_by_walls(first, second, p.hypotheses, p.verification)
     at_best = Verdict(most, 0.0, 1.0, 0.0, most / 2, p.verification.contradiction_weight)
     if confidence(at_best, None, p.confidence) >= p.decision.min_confidence:
-        found = _decided(a, b, find_alignments(first, second, p, shifted), p)
+        ranked = find_alignments(first, second, p, shifted)
+        found = _decided(a, first, b, second, ranked, p)
         if found.decision == "accepted":
             return found
     return propose_all(first, second, shifted, p.hypotheses)
 
 
-def _decided(a: str, b: str, ranked: Sequence[Hypothesis], p: FusionParameters) -> Alignment:
+def _decided(
+    a: str,
+    first: PreparedMap,
+    b: str,
+    second: PreparedMap,
+    ranked: Sequence[Hypothesis],
+    p: FusionParameters,
+) -> Alignment:
     """Return the alignment that the best of hypotheses is, and what is decided about it."""
     if not ranked:
         return _no_alignment(a, b, Reason(ReasonKind.NO_SHAPE))

@@ -113,7 +113,7 @@ def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArr
 
 
 def _extents(label: IntArray, count: int) -> FloatArray:
-    """(count,) the longer sides of the rectangles that spread as the parts of `label` do [cells]."""
+    """(count,) longer sides [cells] of rectangles that spread as the parts of `label` do."""
     i, j = np.nonzero(label)
     part = label[i, j] - 1
     area = np.bincount(part, minlength=count)
