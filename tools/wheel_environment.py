@@ -1,7 +1,7 @@
 """``python -m tools.wheel_environment FOLDER``: an environment that has mapweave as users get it.
 
-It holds the wheel in ``dist/``, compiled for its Python, its dependencies, and what the tests need. The checkout comes
-last on its path: tests and benchmarks are found there, mapweave is not.
+It holds the wheel in ``dist/``, compiled for its Python, its dependencies, and what the tests need.
+The checkout comes last on its path: tests and benchmarks are found there, mapweave is not.
 """
 
 import argparse
