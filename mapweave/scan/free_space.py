@@ -42,8 +42,10 @@ class FreeSpaceParameters(StageParameters):
         description="[m] of the raster in which it is drawn",
     )
     max_cells: int = Field(4_000_000, gt=0, description="of the raster; larger ones get coarser")
-    simplification: float = Field(
-        0.1, gt=0, description="[m] by which outlines may deviate; below the margin"
+    simplification: float = derived(
+        lambda c: min(0.1, 0.4 * c.mapping.clearance),
+        gt=0,
+        description="[m] by which outlines may deviate; below the margin",
     )
     min_width: float = Field(0.25, ge=0, description="[m] narrower streaks are left out")
     min_area: float = Field(0.1, ge=0, description="[m²] smaller pieces are not worth sending")
@@ -68,7 +70,8 @@ def seen_free(sights: Sights, parameters: FreeSpaceParameters) -> BaseGeometry:
     corners, start = outlines(from_core(free, depth), level)
     found = _with_holes(np.split(low + cell * (corners - 0.5), start[1:-1]) if len(corners) else [])
     # What was opened has no neck so narrow that thinning its outline would close it.
-    simpler = shapely.simplify(found, p.simplification - cell / 2, preserve_topology=False)
+    left = max(p.simplification - cell / 2, 0.0)  # what the raster has not taken already
+    simpler = shapely.simplify(found, left, preserve_topology=False)
     whole = shapely.union_all(shapely.make_valid(simpler))
     return MultiPolygon([q for q in _polygons(whole) if q.area >= p.min_area])
 

@@ -48,7 +48,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "DistanceFieldParameters": {"cell": 0.1, "spacing": 0.2},
     "FftCorrelationParameters": {"clearance": 0.5},
     "FittingParameters": {"tolerance": 0.09, "max_hole": 0.3},
-    "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15, "cell": 0.05},
+    "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15, "cell": 0.05, "simplification": 0.1},
     "FusionParameters": {},
     "HypothesisParameters": {},
     "IcpParameters": {"end_scale": 0.04, "noise": 0.1},
@@ -239,8 +239,17 @@ def configurations() -> st.SearchStrategy[Config]:
             values[name] = st.none() | numbers if unset else numbers
         return st.fixed_dictionaries(values)
 
+    def seeing(sensor: dict[str, Any]) -> dict[str, Any]:
+        """Return `sensor` so that readings can count."""
+        farthest = sensor["max_range"]
+        return (
+            sensor
+            if farthest is None
+            else {**sensor, "range_min": min(sensor["range_min"], farthest / 2)}
+        )
+
     return st.fixed_dictionaries(
-        {"sensor": of(Sensor), "robot": of(Robot), "mapping": of(Mapping)}
+        {"sensor": of(Sensor).map(seeing), "robot": of(Robot), "mapping": of(Mapping)}
     ).map(Config.model_validate)
 
 
