@@ -11,8 +11,7 @@ from enum import IntEnum
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name, parse_component
-from mapweave.team.joint_map import JointParameters, build_team_map
-from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
 from mapweave.team.revocation import mark_revoked
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
@@ -62,17 +61,15 @@ class Draft:
     alignments: tuple[Alignment, ...]
     before: tuple[Alignment, ...] = ()
 
-    def build(self, weaver: JointOptimizer, parameters: JointParameters | None = None) -> JointMap:
+    def build(self, builder: JointMapBuilder) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
 
         Parameters
         ----------
-        weaver
-            Remembers, from one version to the next, which submaps fit.
-        parameters
-            Of how maps become one.
+        builder
+            Keeps what it made for the versions before.
         """
-        joint = build_team_map(self.maps, self.alignments, self.version, weaver, parameters)
+        joint = builder.build(self.maps, self.alignments, self.version)
         return mark_revoked(joint, self.before)
 
 

@@ -7,6 +7,7 @@ saw through speak against one of the alignments between them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +19,7 @@ from mapweave.matching.verification import Verdict, VerificationParameters, veri
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.cycles import Edge, poses_along
 from mapweave.team.min_cut import groups
+from mapweave.team.recent import Recent
 
 
 class ContradictionParameters(StageParameters):
@@ -40,6 +42,11 @@ class ContradictionParameters(StageParameters):
     )
     step: float = Field(0.1, gt=0, description="[m] poses nearer to each other are judged once")
     turn_step: float = Field(0.01, gt=0, description="[rad] as well")
+
+
+# By both rasters, and the transform in thousandths of the steps.
+KnownVerdicts: TypeAlias = Recent[tuple[DistanceField, DistanceField, int, int, int], Verdict]
+PARTS = 1000  # of a step, to which a transform is rounded when it is judged
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +78,8 @@ class PairVerdicts:
         Of each component that has seen any wall, in its frame.
     frames
         (n, 3) of the graph's nodes in the components' frames.
+    known
+        What rasters said before, of transforms rounded so finely that it does not matter.
     """
 
     def __init__(
@@ -78,8 +87,10 @@ class PairVerdicts:
         rasters: Mapping[int, DistanceField],
         frames: FloatArray,
         parameters: ContradictionParameters,
+        known: KnownVerdicts | None = None,
     ) -> None:
         self._rasters, self._frames, self._p = rasters, frames, parameters
+        self._verdicts: KnownVerdicts = Recent() if known is None else known
         self._known: dict[tuple[int, ...], PairVerdict | None] = {}
         self._reach = {k: _reach(raster, frames[k]) for k, raster in rasters.items()}
 
@@ -97,9 +108,17 @@ class PairVerdicts:
 
     def _judge(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
         p = self._p
-        there = se2.compose(transform, se2.inverse(self._frames[second]))
-        pose = se2.compose(self._frames[first], there)
-        verdict = verify(self._rasters[first], self._rasters[second], pose, p.verification)
+        one, other = self._rasters[first], self._rasters[second]
+        steps = np.array([p.step, p.step, p.turn_step]) / PARTS
+        x, y, turn = np.round(transform / steps).astype(int).tolist()
+
+        def judge() -> Verdict:
+            rounded = np.array([x, y, turn]) * steps
+            there = se2.compose(rounded, se2.inverse(self._frames[second]))
+            pose = se2.compose(self._frames[first], there)
+            return verify(one, other, pose, p.verification)
+
+        verdict = self._verdicts.get((one, other, x, y, turn), judge)
         allowed = p.allowance * (max(verdict.common, 0.0) + verdict.contradicted)
         excess = verdict.contradicted - allowed
         return (

@@ -20,7 +20,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle_of_path
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.mapping.submap_graph import joining_covariance, tracking_covariance
-from mapweave.maps import Alignment, LineMap, Submap, Trajectory, lines_of
+from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.alignment_graph import Cluster
 
@@ -90,8 +90,10 @@ class JointOptimizer:
         cluster: Cluster,
         submaps: Mapping[str, Sequence[Submap]],
         alignments: Sequence[Alignment],
-    ) -> tuple[Cluster, dict[str, LineMap]]:
-        """Return `cluster` with the poses that fit best, and each component's lines, bent to fit.
+    ) -> tuple[Cluster, dict[str, FloatArray]]:
+        """Return `cluster` with the poses that fit best, and where submaps lie in their components.
+
+        These are (k, 3), of each component's submaps in their order, in its frame.
 
         Parameters
         ----------
@@ -105,7 +107,7 @@ class JointOptimizer:
         ]
         closures = list(self._closures(nodes))
         if not closures:
-            return cluster, {name: lines_of(submaps[name]) for name in cluster.poses}
+            return cluster, {name: _believed(submaps[name]) for name in cluster.poses}
         links = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments), *closures]
         fitted, _ = optimise(np.array([n.submap.pose for n in nodes]), links)
         return _rooted(cluster, nodes, fitted)
@@ -199,6 +201,11 @@ class JointOptimizer:
         return self._loops.compare_two(older, newer, 0.0).link
 
 
+def _believed(submaps: Sequence[Submap]) -> FloatArray:
+    """(k, 3) poses of submaps in their component, as their robot has them."""
+    return np.array([s.pose for s in submaps]).reshape(-1, 3)
+
+
 def _follows(one: _Node, other: _Node) -> bool:
     """Whether the second was finished right after the first."""
     return other.submap.id == one.submap.id + 1
@@ -221,23 +228,21 @@ def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
 
 def _rooted(
     cluster: Cluster, nodes: Sequence[_Node], fitted: FloatArray
-) -> tuple[Cluster, dict[str, LineMap]]:
-    """Return where components are as wholes, the first at the origin, and their lines.
+) -> tuple[Cluster, dict[str, FloatArray]]:
+    """Return where components are as wholes, the first at the origin, and their submaps in them.
 
     Parameters
     ----------
     fitted
         (n, 3) where the nodes fit [m, m, rad].
     """
-    poses, lines = {}, {}
+    poses, own = {}, {}
     for name, frame in cluster.poses.items():
         inside = _of(nodes, name)
         before = np.array([se2.between(frame, nodes[k].submap.pose) for k in inside])
         poses[name] = se2.fit(before, fitted[inside])
-        own = se2.between(poses[name], fitted[inside])
-        maps = [nodes[k].submap.map for k in inside]
-        lines[name] = LineMap.union([m.moved(pose) for m, pose in zip(maps, own, strict=True)])
+        own[name] = se2.between(poses[name], fitted[inside])
     first, root = next(iter(poses.items()))
     rooted = {name: se2.between(root, pose) for name, pose in poses.items()}
     rooted[first] = np.zeros(3)
-    return replace(cluster, poses=rooted), lines
+    return replace(cluster, poses=rooted), own

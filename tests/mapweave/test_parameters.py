@@ -20,7 +20,7 @@ from mapweave.mapping.tracking.tracker import TrackerParameters
 from mapweave.matching.icp import IcpParameters
 from mapweave.parameters import StageParameters
 from mapweave.scan.scan import Scan
-from mapweave.team.joint_map import JointParameters
+from mapweave.team.joining import JointParameters
 from mapweave.team.joint_optimization import JointOptimizationParameters
 from tests.mapweave.buildings import AROUND, BUILDING, cast, walls_of
 from tests.mapweave.test_config import bounds
