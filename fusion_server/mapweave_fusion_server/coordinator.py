@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -19,6 +20,10 @@ from mapweave_protocol.wire.pairs import Run, is_older, states_of
 
 MAX_RUNS = 64  # of a robot: a new battery every hour for a week of days
 REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
+
+
+# A message, the maps that it is carried over to, and the alignments that come of it.
+_CarriedOver: TypeAlias = tuple[AlignmentMessage, tuple[RobotMap, ...], tuple[Alignment, ...]]
 
 
 class CoordinatorParameters(BaseModel):
@@ -92,6 +97,7 @@ class Coordinator:
         self._maps: dict[Run, RobotMap] = {}
         self._states: dict[Run, dict[int, dict[int, SubmapPlace]]] = {}
         self._alignments: dict[frozenset[Run], AlignmentMessage] = {}
+        self._carried: dict[frozenset[Run], _CarriedOver] = {}
         self._urgency = Urgency.NONE
         self._draft: Draft | None = None
         self._begun = -math.inf
@@ -211,13 +217,27 @@ class Coordinator:
         }
         for message in self._alignments.values():
             if self._maps.keys() >= states_of(_ends(message)).keys():
-                first, second = (self._change(end) for end in _ends(message))
-                for alignment in message.unpack():
+                for alignment in self._carried_over(message):
                     if {alignment.reference, alignment.other} <= existing:
-                        robot, _ = parse_component(alignment.reference)
-                        straight = robot == message.reference.robot
-                        ours, theirs = (first, second) if straight else (second, first)
-                        yield carry(alignment, ours, theirs)
+                        yield alignment
+
+    def _carried_over(self, message: AlignmentMessage) -> tuple[Alignment, ...]:
+        """Return the alignments of `message` for the maps as they are; kept until these change."""
+        runs = frozenset(states_of(_ends(message)))
+        states = tuple(self._maps[_run(end)] for end in _ends(message))
+        kept = self._carried.get(runs)
+        if kept is None or kept[:2] != (message, states):
+            kept = message, states, tuple(self._carry(message))
+            self._carried[runs] = kept
+        return kept[2]
+
+    def _carry(self, message: AlignmentMessage) -> Iterator[Alignment]:
+        first, second = (self._change(end) for end in _ends(message))
+        for alignment in message.unpack():
+            robot, _ = parse_component(alignment.reference)
+            straight = robot == message.reference.robot
+            ours, theirs = (first, second) if straight else (second, first)
+            yield carry(alignment, ours, theirs)
 
     def _runs_of(self, robot: str) -> list[RobotMap]:
         return [robot_map for run, robot_map in self._maps.items() if run[0] == robot]

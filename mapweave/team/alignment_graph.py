@@ -215,15 +215,14 @@ class _Graph:
     def _with_bridges(self, inside: Sequence[int]) -> Iterator[tuple[Edge, bool]]:
         """Yield the edges `inside`, and of each whether all hangs on it: nothing can refute it."""
         count = len(self._names)
-        parts = len(groups(count, self._edges, inside))
         _, paths = poses_along(self._edges[inside[0]].first, count, self._edges, inside)
+        cycles = 0  # the edges in any: those in one that an edge closes with the paths to its ends
         for k in inside:
-            is_needed = any(path > 0 and path >> k & 1 for path in paths)
-            rest = [other for other in inside if other != k]
-            yield (
-                self._edges[k],
-                is_needed and len(groups(count, self._edges, rest)) > parts,
-            )
+            closing = paths[self._edges[k].first] ^ paths[self._edges[k].second]
+            if closing != 1 << k:
+                cycles |= closing | 1 << k
+        for k in inside:
+            yield self._edges[k], not cycles >> k & 1
 
 
 def _place(link: Alignment) -> float:

@@ -7,6 +7,7 @@ saw through speak against one of the alignments between them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import inf
 from typing import TypeAlias
 
 import numpy as np
@@ -94,17 +95,23 @@ class PairVerdicts:
         self._known: dict[tuple[int, ...], PairVerdict | None] = {}
         self._reach = {k: _reach(raster, frames[k]) for k, raster in rasters.items()}
 
-    def ask(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
-        """Return what speaks against `transform` (3,) of node `second` in the frame of `first`."""
-        if first not in self._rasters or second not in self._rasters:
-            return None
-        if np.hypot(*transform[:2]) > self._reach[first] + self._reach[second]:
-            return None
+    def ask(self, pairs: Sequence[tuple[int, int]], transforms: FloatArray) -> list[PairVerdict]:
+        """Return what speaks against transforms (n, 3), each of a pair's second to its first."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
-        key = (first, second, *(int(v) for v in np.round(transform / steps)))
-        if key not in self._known:
-            self._known[key] = self._judge(first, second, transform)
-        return self._known[key]
+        keys = np.round(transforms / steps).astype(np.int64).tolist()
+        apart = np.hypot(transforms[:, 0], transforms[:, 1]).tolist()
+        found = []
+        for k, (first, second) in enumerate(pairs):
+            # What has seen no wall says nothing, nor do two that are too far apart.
+            if apart[k] > self._reach.get(first, -inf) + self._reach.get(second, -inf):
+                continue
+            key = (first, second, *keys[k])
+            if key not in self._known:
+                self._known[key] = self._judge(first, second, transforms[k])
+            verdict = self._known[key]
+            if verdict is not None:
+                found.append(verdict)
+        return found
 
     def _judge(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
         p = self._p
@@ -144,14 +151,15 @@ class MapContradictions:
 
     def against(self, present: Sequence[int]) -> list[PairVerdict]:
         """Return all that speaks against the edges `present`."""
-        found = []
+        found: list[PairVerdict] = []
         for group in groups(self._count, self._edges, present):
             if len(group) == 1:
                 continue
             poses, _ = poses_along(group[0], self._count, self._edges, present)
-            for a, b in combinations(group, 2):
-                found.append(self._witnesses.ask(a, b, se2.between(poses[a], poses[b])))
-        return [witness for witness in found if witness is not None]
+            pairs = list(combinations(group, 2))
+            first, second = np.array(pairs).T
+            found += self._witnesses.ask(pairs, se2.between(poses[first], poses[second]))
+        return found
 
 
 def _reach(raster: DistanceField, frame: FloatArray) -> float:

@@ -6,7 +6,6 @@ robust pose graph over all robots' submaps takes what is found. The robots' maps
 bend by as much; which robots are joined, and how sure that is, was decided before.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -133,29 +132,37 @@ class JointOptimizer:
         p = self._p
         loose = np.array([p.alignment_sigma, p.alignment_sigma, p.alignment_turn])
         covariance = np.diag(loose**2)
-        for a in alignments:
-            ours, theirs = (_of(nodes, name) for name in (a.reference, a.other))
-            if a.decision != "accepted" or not (ours and theirs):
-                continue
-            i, j = min(
-                ((i, j) for i in ours for j in theirs), key=lambda pair: _apart(nodes, *pair)
+        inside = _by_component(nodes)
+        relied = [
+            a
+            for a in alignments
+            if a.decision == "accepted" and inside.get(a.reference) and inside.get(a.other)
+        ]
+        if not relied:
+            return
+        ends = [_nearest(nodes, inside[a.reference], inside[a.other]) for a in relied]
+        poses = np.array([n.submap.pose for n in nodes])
+        first, second = (
+            se2.between(np.array([cluster.poses[n] for n in names]), poses[list(those)])
+            for names, those in (
+                ([a.reference for a in relied], [i for i, _ in ends]),
+                ([a.other for a in relied], [j for _, j in ends]),
             )
-            frames = cluster.poses[a.reference], cluster.poses[a.other]
-            first, second = (
-                se2.between(frame, nodes[k].submap.pose)
-                for frame, k in zip(frames, (i, j), strict=True)
-            )
-            step = se2.between(first, se2.compose(a.transform, second))
+        )
+        there = se2.compose(np.array([a.transform for a in relied]), second)
+        for (i, j), step in zip(ends, se2.between(first, there), strict=True):
             yield Constraint(i, j, step, covariance, True)
 
     def _closures(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
         """Yield how submaps lie to each other that saw the same walls."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
         left = self._p.at_once
-        for first, second in self._candidates(nodes):
-            older, newer = nodes[first].submap, nodes[second].submap
-            x, y, turn = np.round(se2.between(older.pose, newer.pose) / steps).astype(int).tolist()
-            asked = _Compared(older.map, newer.map, x, y, turn)
+        pairs = list(self._candidates(nodes))
+        poses = np.array([n.submap.pose for n in nodes])
+        older, newer = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        between = np.round(se2.between(poses[older], poses[newer]) / steps).astype(np.int64)
+        for (first, second), about in zip(pairs, between.tolist(), strict=True):
+            asked = _Compared(nodes[first].submap.map, nodes[second].submap.map, *about)
             if asked not in self._known and left > 0:
                 left -= 1
                 self._remember(asked)
@@ -173,14 +180,18 @@ class JointOptimizer:
         """Yield pairs of nodes near each other that tracking does not link."""
         p = self._p
         compared = [k for k in self._finished(nodes) if len(nodes[k].submap.map.segments)]
-        for k in compared:
+        middles = np.array([nodes[k].middle for k in compared]).reshape(-1, 2)
+        for last, k in enumerate(compared):
+            apart = np.hypot(*(middles[:last] - middles[last]).T)
             near: dict[str, list[tuple[float, int]]] = {}
-            for j in (j for j in compared if j < k and not _is_tracked(nodes, j, k)):
-                near.setdefault(nodes[j].component, []).append((_apart(nodes, j, k), j))
+            for at in np.flatnonzero(apart < p.reach).tolist():
+                j = compared[at]
+                if not _is_tracked(nodes, j, k):
+                    near.setdefault(nodes[j].component, []).append((float(apart[at]), j))
             nearest = sorted(
                 pair for those in near.values() for pair in sorted(those)[: p.candidates]
             )
-            yield from ((j, k) for distance, j in nearest[: p.most] if distance < p.reach)
+            yield from ((j, k) for _, j in nearest[: p.most])
 
     def _finished(self, nodes: Sequence[_Node]) -> list[int]:
         """Return the nodes without the newest of each component, unless that is its only one."""
@@ -217,13 +228,19 @@ def _is_tracked(nodes: Sequence[_Node], first: int, second: int) -> bool:
     return one.component == other.component and _follows(one, other)
 
 
-def _of(nodes: Sequence[_Node], component: str) -> list[int]:
-    return [k for k, node in enumerate(nodes) if node.component == component]
+def _by_component(nodes: Sequence[_Node]) -> dict[str, list[int]]:
+    inside: dict[str, list[int]] = {}
+    for k, node in enumerate(nodes):
+        inside.setdefault(node.component, []).append(k)
+    return inside
 
 
-def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
-    """[m] between the middles of two submaps."""
-    return math.dist(nodes[first].middle, nodes[second].middle)
+def _nearest(nodes: Sequence[_Node], ours: Sequence[int], theirs: Sequence[int]) -> tuple[int, int]:
+    """Return the two, one of each, whose middles are nearest to each other."""
+    here, there = (np.array([nodes[k].middle for k in those]) for those in (ours, theirs))
+    apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
+    i, j = np.unravel_index(int(apart.argmin()), apart.shape)
+    return ours[int(i)], theirs[int(j)]
 
 
 def _rooted(
@@ -236,10 +253,10 @@ def _rooted(
     fitted
         (n, 3) where the nodes fit [m, m, rad].
     """
-    poses, own = {}, {}
+    poses, own, by_component = {}, {}, _by_component(nodes)
     for name, frame in cluster.poses.items():
-        inside = _of(nodes, name)
-        before = np.array([se2.between(frame, nodes[k].submap.pose) for k in inside])
+        inside = by_component[name]
+        before = se2.between(frame, np.array([nodes[k].submap.pose for k in inside]))
         poses[name] = se2.fit(before, fitted[inside])
         own[name] = se2.between(poses[name], fitted[inside])
     first, root = next(iter(poses.items()))
