@@ -140,16 +140,19 @@ def bad_cycles_through(
     closing = [k for k in here if masks[k]]
     if not closing:
         return []
-    transforms = np.array([edges[k].transform for k in closing])
+    transforms = np.array([edges[k].forth for k in closing])
     first = poses[[edges[k].first for k in closing]]
     second = poses[[edges[k].second for k in closing]]
     off = misfit(transforms, first, second)
     # Errors of independent alignments add up as their squares do.
     length = np.array([masks[k].bit_count() / 3 for k in closing])
-    bent = np.array([_bent(edges, masks[k]) for k in closing])
-    bad = np.sum(off[:, :2] ** 2, axis=1) > p.max_distance**2 * length + bent
-    bad |= np.abs(off[:, 2]) > p.max_turn * np.sqrt(length)
-    return [masks[k] for k, is_bad in zip(closing, bad, strict=True) if is_bad]
+    beyond = np.sum(off[:, :2] ** 2, axis=1) - p.max_distance**2 * length
+    turned = np.abs(off[:, 2]) > p.max_turn * np.sqrt(length)
+    return [
+        masks[closing[at]]
+        for at in np.flatnonzero((beyond > 0) | turned).tolist()
+        if turned[at] or beyond[at] > _bent(edges, masks[closing[at]])
+    ]
 
 
 def _bent(edges: Sequence[Edge], mask: int) -> float:

@@ -20,7 +20,7 @@ from mapweave.maps import (
 from mapweave.matching.distance_field import DistanceField
 from mapweave.team.alignment_graph import Cluster, cluster_components
 from mapweave.team.contradictions import KnownVerdicts
-from mapweave.team.joining import JointParameters, Piece, join
+from mapweave.team.joining import JointParameters, Kept, Piece, join
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 from mapweave.team.recent import Recent
 
@@ -46,6 +46,7 @@ class JointMapBuilder:
         self._wholes: Recent[tuple[tuple[LineMap, bytes], ...], DistanceField | None] = Recent()
         self._rasters: Recent[LineMap, DistanceField | None] = Recent()
         self._verdicts: KnownVerdicts = Recent()
+        self._kept = Kept()
 
     def build(
         self, maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int
@@ -55,7 +56,7 @@ class JointMapBuilder:
         Alignments that contradict others, or what robots saw, are set aside: they stay in the joint
         map as ambiguous, the reason saying so.
         """
-        for kept in (self._wholes, self._rasters, self._verdicts):
+        for kept in (self._wholes, self._rasters, self._verdicts, self._kept):
             kept.turn()
         submaps = submaps_by_component(maps)
         found = {name: self._whole(each) for name, each in submaps.items()}
@@ -89,7 +90,7 @@ class JointMapBuilder:
             ]
             for name, those in poses.items()
         }
-        return join(cluster, pieces, self.parameters)
+        return join(cluster, pieces, self.parameters, self._kept)
 
     def _raster(self, lines: LineMap) -> DistanceField | None:
         return self._rasters.get(lines, lambda: rasterise(lines, self.parameters))

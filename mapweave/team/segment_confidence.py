@@ -70,10 +70,11 @@ def _vote(
 ) -> None:
     """Add to two masks (n,) where the piece has a wall itself, and where it saw through instead."""
     near, through = said
-    own = se2.transform_points(se2.inverse(pose), oriented.points)
-    low, high = raster.origin, raster.origin + raster.cell * np.array(raster.distance.shape)
-    inside = np.flatnonzero(((own >= low) & (own < high)).all(axis=1))
-    _, distance, depth = raster.look_up(own[inside])
-    walls = distance <= p.closeness
+    index = (se2.transform_points(se2.inverse(pose), oriented.points) - raster.origin) / raster.cell
+    rows, columns = raster.distance.shape
+    i, j = index[:, 0], index[:, 1]
+    inside = np.flatnonzero((i >= 0) & (j >= 0) & (i < rows) & (j < columns))
+    cells = i[inside].astype(np.int64), j[inside].astype(np.int64)
+    walls = raster.distance[cells] <= p.closeness
     near[inside[walls]] = True
-    through[inside[~walls & (depth > p.clearance)]] = True
+    through[inside[~walls & (raster.depth[cells] > p.clearance)]] = True
