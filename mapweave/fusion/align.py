@@ -8,6 +8,7 @@ places is accepted only as far as it is right for the rest of the maps as well.
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -23,9 +24,21 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import Alignment, LineMap, RobotMap, component_name
 from mapweave.matching.distance_field import DistanceFieldParameters
-from mapweave.matching.hypotheses import HypothesisParameters, PreparedMap, different, hypothesise
+from mapweave.matching.hypotheses import (
+    HypothesisParameters,
+    PreparedMap,
+    different,
+    hypothesise,
+    propose_all,
+    propose_by_walls,
+)
 from mapweave.matching.icp import IcpParameters, Target, align_all
-from mapweave.matching.verification import VerificationParameters, shared_complexity, verify
+from mapweave.matching.verification import (
+    Verdict,
+    VerificationParameters,
+    shared_complexity,
+    verify,
+)
 from mapweave.parameters import StageParameters, derived
 from mapweave.reasons import Reason, ReasonKind
 
@@ -177,7 +190,33 @@ def compare(
     if first is None or second is None:
         poor = ReasonKind.SMALL_REFERENCE if first is None else ReasonKind.SMALL_OTHER
         return _no_alignment(a, b, Reason(poor, {"min_wall": p.min_wall}))
-    ranked = find_alignments(first, second, p, possible)
+    found = _by_walls(a, first, b, second, p) if possible is None else None
+    if isinstance(found, Alignment):
+        return found
+    return _decided(
+        a, b, find_alignments(first, second, p, possible if found is None else found), p
+    )
+
+
+def _by_walls(
+    a: str, first: PreparedMap, b: str, second: PreparedMap, p: FusionParameters
+) -> Alignment | FloatArray:
+    """Return the alignment that parallel walls alone prove; else all that is proposed (n, 3).
+
+    It is convincing as it stands, its rivals among what was proposed: shapes need not be looked
+    for. Where not even all that walls may have in common would convince, it is not tried.
+    """
+    shifted, most = propose_by_walls(first, second, p.hypotheses, p.verification)
+    at_best = Verdict(most, 0.0, 1.0, 0.0, most / 2, p.verification.contradiction_weight)
+    if confidence(at_best, None, p.confidence) >= p.decision.min_confidence:
+        found = _decided(a, b, find_alignments(first, second, p, shifted), p)
+        if found.decision == "accepted":
+            return found
+    return propose_all(first, second, shifted, p.hypotheses)
+
+
+def _decided(a: str, b: str, ranked: Sequence[Hypothesis], p: FusionParameters) -> Alignment:
+    """Return the alignment that the best of hypotheses is, and what is decided about it."""
     if not ranked:
         return _no_alignment(a, b, Reason(ReasonKind.NO_SHAPE))
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
