@@ -232,16 +232,26 @@ def _by_walls(
     """Return the alignment that parallel walls alone prove; else all that is proposed (n, 3).
 
     It is convincing as it stands, its rivals among what was proposed: shapes need not be looked
-    for. Where not even all that walls may have in common would convince, it is not tried.
+    for. Where cells tell already that it will not be, it is not tried.
     """
-    shifted, most = propose_by_walls(first, second, p.hypotheses, p.verification)
-    at_best = Verdict(most, 0.0, 1.0, 0.0, most / 2, p.verification.contradiction_weight)
-    if confidence(at_best, None, p.confidence) >= p.decision.min_confidence:
+    shifted, scores = propose_by_walls(first, second, p.hypotheses, p.verification)
+    middle = second.raster.oriented.points.mean(axis=0)
+    leaders = different(shifted, scores, middle, p.hypotheses)
+    if _may_convince(scores[leaders[:2]].tolist(), p):
         ranked = find_alignments(first, second, p, shifted)
         found = _decided(a, first, b, second, ranked, p)
         if found.decision == "accepted":
             return found
     return propose_all(first, second, shifted, p.hypotheses)
+
+
+def _may_convince(scores: Sequence[float], p: FusionParameters) -> bool:
+    """Tell whether the first of `scores` [m] would do, were it held evenly, with such a rival."""
+    weight = p.verification.contradiction_weight
+    best, rival = (
+        Verdict(score, 0.0, 1.0, 0.0, score / 2, weight) for score in (*scores, 0.0, 0.0)[:2]
+    )
+    return confidence(best, rival, p.confidence) >= p.decision.min_confidence
 
 
 def _decided(

@@ -118,10 +118,10 @@ def propose_by_walls(
     other: PreparedMap,
     parameters: HypothesisParameters,
     verification: VerificationParameters,
-) -> tuple[FloatArray, float]:
-    """Return (n, 3) transforms that lay parallel walls on each other, and the best score [m].
+) -> tuple[FloatArray, FloatArray]:
+    """Return (n, 3) transforms that lay parallel walls on each other, and their (n,) scores [m].
 
-    That is of walls in cells: about what `verify` makes of it, once aligned.
+    These are of walls in cells: about what `verify` makes of them, once aligned.
     """
     p = parameters
     turns = likely_turns(
@@ -132,8 +132,7 @@ def propose_by_walls(
         for shape in (reference, other)
     ]
     weight = verification.contradiction_weight
-    shifted, scores = correlate(marks[0], marks[1], turns, weight, p.correlation)
-    return shifted, float(scores.max(initial=-np.inf))
+    return correlate(marks[0], marks[1], turns, weight, p.correlation)
 
 
 def propose_all(

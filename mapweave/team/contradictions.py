@@ -99,6 +99,7 @@ class PairVerdicts:
         """Return what speaks against transforms (n, 3), each of a pair's second to its first."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
         keys = np.round(transforms / steps).astype(np.int64).tolist()
+        rounded = np.round(transforms / (steps / PARTS)).astype(np.int64).tolist()
         apart = np.hypot(transforms[:, 0], transforms[:, 1]).tolist()
         found = []
         for k, (first, second) in enumerate(pairs):
@@ -107,20 +108,20 @@ class PairVerdicts:
                 continue
             key = (first, second, *keys[k])
             if key not in self._known:
-                self._known[key] = self._judge(first, second, transforms[k])
+                self._known[key] = self._judge(first, second, rounded[k])
             verdict = self._known[key]
             if verdict is not None:
                 found.append(verdict)
         return found
 
-    def _judge(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
+    def _judge(self, first: int, second: int, at: Sequence[int]) -> PairVerdict | None:
+        """Judge the transform that lies `at` so many parts of the steps."""
         p = self._p
         one, other = self._rasters[first], self._rasters[second]
-        steps = np.array([p.step, p.step, p.turn_step]) / PARTS
-        x, y, turn = np.round(transform / steps).astype(int).tolist()
+        x, y, turn = at
 
         def judge() -> Verdict:
-            rounded = np.array([x, y, turn]) * steps
+            rounded = np.array(at) * np.array([p.step, p.step, p.turn_step]) / PARTS
             there = se2.compose(rounded, se2.inverse(self._frames[second]))
             pose = se2.compose(self._frames[first], there)
             return verify(one, other, pose, p.verification)

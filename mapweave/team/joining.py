@@ -21,7 +21,9 @@ from mapweave.team.merging_tree import KnownMergings, Walls, merge_all
 from mapweave.team.recent import Recent
 from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
 
-STEPS = np.array([5e-4, 5e-4, 5e-5])  # [m, m, rad] by which pieces are laid: half of the wire's
+STEPS = np.array(
+    [2e-3, 2e-3, 2e-4]
+)  # [m, m, rad] by which pieces are laid: what a laser cannot tell
 
 
 class JointParameters(StageParameters):
