@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # numba 0.68.1: compiling a function changes the mean of float32 ranges, from 10.00 m to 9.34 m.
 #
-# Expected: numba supports `sum` and `mean` of arrays and promises NumPy's results but for listed
-# exceptions; NumPy adds float32 pairwise, so that ten million of them still give seven digits. The
-# compiled function even returns a Python float, a double, which looks as if it had summed in one.
+# Expected: numba lists `sum` and `mean` of arrays among what it supports of NumPy, whose float32
+# sums are pairwise, so that ten million of them still give six digits. The compiled function even
+# returns a Python float, a double, which looks as if it had summed in one.
 #
 # What happens: the compiled sum is one float32 to which element after element is added. As it
 # grows, its last bit outgrows what is added: at 67 million metres it is 4 m to 8 m, and ranges of
@@ -12,8 +12,8 @@
 # without numba, or with few points, pass.
 #
 # Seen (ranges between 9.9 m and 10.1 m):
-#      72000 ranges: compiled 10.0001 m, NumPy 10.0000 m
-#   10000000 ranges: compiled 9.3419 m, NumPy 10.0000 m; type of the result: float
+#      72000 ranges: compiled 10.0001 m, NumPy 10.0001 m
+#   10000000 ranges: compiled 9.3420 m, NumPy 10.0000 m; type of the result: float
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -2,8 +2,8 @@
 # eclipse-zenoh 1.10.2: a rate limit on "team/*/map" is one allowance for all robots together, and
 # the one that always speaks second gets nothing through.
 #
-# Expected: a downsampling rule names key expressions and a maximum frequency; the documentation
-# speaks of the frequency of the messages on a key. Under "5 Hz on team/*/map" two robots that
+# Expected: a downsampling rule is a key expression and the maximum frequency for it, and says no
+# more in the commented default configuration. Under "5 Hz on team/*/map" two robots that
 # publish at 4 Hz each are both within it: all samples pass. Should the limit be meant for both
 # together, each would be expected to lose a part.
 #
