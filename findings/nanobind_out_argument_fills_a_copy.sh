@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # nanobind 3.1.0 with numpy 2.4.6: a kernel that writes into an array it was handed fills a
-# temporary copy, if the array is float32, of integers, or strided; the caller's own stays as it was.
+# temporary copy, if the array is float32, of integers, or strided; the caller's stays as it was.
 # Needs a C++17 compiler (g++) and Python's headers.
 #
 # Expected: the parameter is declared as a contiguous one-dimensional array of doubles in memory of
