@@ -10,12 +10,8 @@
 # places 2, 3 and 5, which is what every uncorrelated g2o edge has, are taken for a covariance
 # matrix in that order. Sigmas come out as 20 m, 20 m and 100 rad: 400 and 10000 times too loose,
 # without a word. Where all edges are of one kind the optimum barely moves, so it is found only when
-<<<<<<< HEAD
-# gates, chi-squares or a prior come in; with mixed edges the best ones weigh least. `readG2o` on the same file is right. A correlated edge makes load2D raise.
-=======
 # gates, chi-squares or a prior come in; with mixed edges the best ones weigh least.
 # `readG2o` on the same file is right. A correlated edge makes load2D raise.
->>>>>>> findings
 #
 # Seen:
 #   load2D:                [20.0, 20.0, 100.0]

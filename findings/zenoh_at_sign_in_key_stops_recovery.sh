@@ -8,15 +8,9 @@
 # wildcards do not match them, so a subscriber has to write them out. A version in the key,
 # "team/@v1/...", written out by all, then looks like a sound use of that rule.
 #
-<<<<<<< HEAD
-# What happens: the publisher announces itself below its key, followed by chunks with "@" of its
-# own, and the subscriber finds the key again by an expression with "**", which does not pass
-# another "@". First subscription, live samples, and a newcomer's history all work, so tests pass.
-=======
 # What happens: the publisher announces itself below its key, by chunks with "@" of its own, and
 # the subscriber seems to find the key again by a wildcard, which passes no other "@". First
 # subscription, live samples, and a newcomer's history all work, so tests pass.
->>>>>>> findings
 # Only in the case it is used for, router gone and back, nothing comes: until the next sample is
 # published, and then all of it. For a map that is published last and never again that is never.
 #

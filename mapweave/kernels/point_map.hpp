@@ -352,7 +352,7 @@ class PointMap {
     if (columns * rows * 2 < columns_ * rows_) lay_out(left_ + first - kMargin, low_ + lowest - kMargin, columns, rows);
   }
 
-  // Calls `visit` with each cell of the ring of cells `r` away from (i, j).
+  // Calls `visit` with each cell of the ring of cells `r` away from (i, j), and the number of its column and row.
   template <typename Visit>
   void ring(int64_t i, int64_t j, int64_t r, Visit&& visit) const {
     const int64_t a0 = std::max(i - r, left_), a1 = std::min(i + r, left_ + columns_ - 1);
@@ -360,12 +360,18 @@ class PointMap {
     for (int64_t a = a0; a <= a1; ++a) {
       const std::vector<Point>* column = cells_.data() + (a - left_) * rows_ - low_;
       if (a == i - r || a == i + r) {
-        for (int64_t b = b0; b <= b1; ++b) visit(column[b]);
+        for (int64_t b = b0; b <= b1; ++b) visit(column[b], a, b);
       } else {
-        if (j - r >= low_ && j - r < low_ + rows_) visit(column[j - r]);
-        if (r > 0 && j + r >= low_ && j + r < low_ + rows_) visit(column[j + r]);
+        if (j - r >= low_ && j - r < low_ + rows_) visit(column[j - r], a, j - r);
+        if (r > 0 && j + r >= low_ && j + r < low_ + rows_) visit(column[j + r], a, j + r);
       }
     }
+  }
+
+  // [m] how far `value` is from the cells of one number, in one coordinate; rounded down.
+  double gap_to(double value, int64_t number) const {
+    const double before = number * cell_ - value, after = value - (number + 1) * cell_;
+    return std::max(0.0, std::max(before, after) - kRounding);
   }
 
   const Point* nearest(double x, double y, double u, double v, double reach) const {
@@ -390,7 +396,13 @@ class PointMap {
         next = std::min(next, gap * gap);
         break;
       }
-      ring(i, j, r, [&](const std::vector<Point>& here) {
+      ring(i, j, r, [&](const std::vector<Point>& here, int64_t a, int64_t b) {
+        if (here.empty()) return;
+        const double gap_x = gap_to(x, a), gap_y = gap_to(y, b), nearest_here = gap_x * gap_x + gap_y * gap_y;
+        if (nearest_here > best) {
+          next = std::min(next, nearest_here);
+          return;
+        }
         for (const Point& q : here) {
           const double d = squared(q, x, y, u, v);
           if (d < best || (found && d == best && q.number < found->number)) {
@@ -418,9 +430,9 @@ class PointMap {
 
   bool any_within(double x, double y, double u, double v, double reach) const {
     const double limit = reach * reach;
-    const int64_t cells = static_cast<int64_t>(std::min(std::ceil(reach / cell_), 1e9));
-    const int64_t i0 = std::max(index(x) - cells, left_), i1 = std::min(index(x) + cells, left_ + columns_ - 1);
-    const int64_t j0 = std::max(index(y) - cells, low_), j1 = std::min(index(y) + cells, low_ + rows_ - 1);
+    const double wide = std::min(reach, 1e9 * cell_) + kRounding;
+    const int64_t i0 = std::max(index(x - wide), left_), i1 = std::min(index(x + wide), left_ + columns_ - 1);
+    const int64_t j0 = std::max(index(y - wide), low_), j1 = std::min(index(y + wide), low_ + rows_ - 1);
     for (int64_t i = i0; i <= i1; ++i)
       for (int64_t j = j0; j <= j1; ++j)
         for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)])
@@ -488,6 +500,7 @@ class PointMap {
   }
 
   static constexpr double kWeakest = 1e-6;  // [1/m², 1/rad²] so that a start without pairs stays
+  static constexpr double kRounding = 1e-9;  // [m] by which places may err
   static constexpr int64_t kMargin = 16;  // cells around what is there
   static constexpr int64_t kMaxCells = int64_t{1} << 26;
 };

@@ -109,14 +109,15 @@ def test_viewpoints_saw_through_the_same(seed: int, count: int, spacing: float) 
 
 
 @settings(max_examples=25, deadline=None)
-@given(seeds, st.integers(0, 60))
-def test_windows_score_the_same(seed: int, count: int) -> None:
+@given(seeds, st.integers(0, 60), st.booleans())
+def test_windows_score_the_same(seed: int, count: int, regular: bool) -> None:
     rng = np.random.default_rng(seed)
     points, origin = rng.uniform(-4, 4, (count, 2)), np.array([-3.0, -3.0])
     field = correlative.nearness_field(points, origin, 0.1, 60, 0.15)
     twin = correlative.nearness_field_numpy(points, origin, 0.1, 60, 0.15)
     np.testing.assert_allclose(field, twin, atol=1e-6)
-    window = rng.uniform(-3, 3, 5), rng.uniform(-1, 1, (4, 2))
+    shifts = np.arange(-0.9, 1, 0.3)[:, None] + rng.uniform(-1, 1, 2)
+    window = rng.uniform(-3, 3, 40), shifts if regular else rng.uniform(-1, 1, (4, 2))
     one = correlative.window_scores(points, twin, origin, 0.1, *window)
     other = correlative.window_scores_numpy(points, twin, origin, 0.1, *window)
     np.testing.assert_allclose(one, other, atol=1e-4)
