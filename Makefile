@@ -5,7 +5,7 @@ STAMP := .venv/.installed
 KERNELS := .venv/.kernels
 
 WHEEL_BIN := .venv-wheel/bin
-PACKAGES := mapweave protocol agent fusion_server deploy
+PACKAGES := mapweave protocol ros agent fusion_server deploy
 SOURCES := pyproject.toml README.md LICENSE \
 	$(shell find $(PACKAGES) -name __pycache__ -prune -o -print)
 # PYTHONSAFEPATH: programs that tests start import the wheel as well, not the checkout.

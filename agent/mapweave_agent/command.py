@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -42,7 +43,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         "--source",
         metavar="SOURCE",
         help="where the scans come from: a log or a bag to play, - for lines of JSON on standard"
-        " input, or what an installed package brings",
+        " input, ros2:/scan for a ROS 2 topic on Zenoh, or what an installed package brings",
     )
     sources.add_argument(
         "--log", dest="source", metavar="LOG", help="the laser log to play, as --source"
@@ -53,7 +54,8 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         type=argument(parse_rate),
         default="1",
         metavar="X",
-        help="how many times real time the log is played, or max (default 1)",
+        help="how many times real time a recording is played, or max (default 1); with max no scan"
+        " of a live source is skipped either",
     )
     parser.add_argument(
         "--scans",
@@ -95,7 +97,7 @@ def _run(options: argparse.Namespace) -> int:
     config = config_of(options)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
     step, warn = config.sensor.angular_step, told_once(_log.warning)
-    source = open_source(options.source, ReadOptions(False, step, options.topic, warn))
+    source = open_source(options.source, ReadOptions(False, step, options.topic, warn, endpoints))
     total = count_selected(options.source, source, options.scans)
     earlier = EarlierRuns.of(team, robot, options.state)
 
@@ -124,7 +126,8 @@ def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> N
     """Run on the scans chosen: a recording is played at a rate, others come when they come."""
     stopping = stop_on_signal()
     if source.live:
-        with scans_of(source, options.scans) as scans:
+        skipping = not math.isinf(options.rate)
+        with scans_of(source, options.scans, skipping=skipping) as scans:
             run.run_live(scans, stopping)
     else:
         run.run(options.scans.of(source.scans()), ReplayClock(options.rate), stopping)

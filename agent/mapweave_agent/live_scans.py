@@ -10,12 +10,14 @@ from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import ScanSource
 from mapweave.scan.scan import Scan
 
-BACKLOG = 4
-"""Scans that may wait: what a mapper catches up with after it was held up for a moment."""
+BACKLOG = 1
+"""Scans that may wait: a newer one takes the place, so that none is older than a period."""
+
+FAREWELL = 2.0  # [s] for a source to leave its network
 
 
 class LiveScans:
-    """A short queue that never makes a sensor wait: the oldest scan goes where it is full."""
+    """Room for the newest scan, which never makes a sensor wait: an older one makes way."""
 
     def __init__(self, backlog: int = BACKLOG) -> None:
         self._backlog = backlog
@@ -79,23 +81,36 @@ class LiveScans:
 
 
 @contextmanager
-def scans_of(source: ScanSource, selected: ScanRange) -> Iterator[LiveScans]:
-    """Read a live source in a thread of its own; one that writes to a pipe waits for its turn."""
+def scans_of(
+    source: ScanSource, selected: ScanRange, *, skipping: bool = True
+) -> Iterator[LiveScans]:
+    """Read a live source in a thread of its own.
+
+    Parameters
+    ----------
+    skipping
+        Whether scans that come faster than they are taken are left out; otherwise none is, and
+        the source waits for its turn.
+    """
     live = LiveScans()
+    hand_over = live.put if skipping else live.put_in_turn
 
     def read() -> None:
         failure = None
         try:
             for scan in selected.of(source.scans()):
-                live.put_in_turn(scan)
+                hand_over(scan)
         except MapweaveError as error:
             failure = error
         finally:
             live.close(failure)
 
-    # Nothing can wake a thread that waits for a sensor: it ends with the process.
-    threading.Thread(target=read, name="source", daemon=True).start()
+    # Nothing can wake a thread that waits for a pipe: it ends with the process.
+    reader = threading.Thread(target=read, name="source", daemon=True)
+    reader.start()
     try:
         yield live
     finally:
         live.close()
+        source.close()
+        reader.join(FAREWELL)

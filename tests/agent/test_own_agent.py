@@ -55,6 +55,7 @@ def test_lines_on_standard_input_are_mapped_as_their_log_is(
 ) -> None:
     scans = scans_of(logs[0])
     where = ["--robot", "a", "--team", team, "--connect", endpoint, "--source", "-"]
+    where += ["--rate", "max"]
     with open_session([endpoint], patience=PATIENCE) as session:
         listener = Listener(session, team)
         with subprocess.Popen(

@@ -1,0 +1,23 @@
+"""What can be wrong with what is asked of a ROS 2 network."""
+
+from mapweave.errors import MapweaveError
+
+
+class Ros2SourceError(MapweaveError):
+    """A word ``ros2:…`` that names no laser.
+
+    Parameters
+    ----------
+    name
+        The word.
+    problem
+        What is wrong with it.
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        super().__init__(
+            f"source {name!r}: {problem}; expected ros2:/TOPIC[@X,Y,DEGREES[,upside-down]], several"
+            " joined by +, and ?connect=ENDPOINT&domain=N where these differ"
+        )
+        self.name = name
+        self.problem = problem
