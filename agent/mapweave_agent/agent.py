@@ -14,7 +14,8 @@ from mapweave.team.hysteresis import keep_joined
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
-from mapweave_agent.live_scans import LiveScans
+from mapweave_agent.live.scans import LiveScans
+from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
 from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
@@ -91,7 +92,10 @@ class AgentRun:
         if past:
             self._comparisons.earlier_map(past[-1].map)
         self._needs = Needs(mapper.robot)
-        self._reception = Dispatcher(mapper.robot, mapper.boot, self._comparisons, self._needs)
+        self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
+        self._reception = Dispatcher(
+            mapper.robot, mapper.boot, self._comparisons, self._needs, self._whereabouts
+        )
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
         self._inbox = Inbox()
         self._published: RobotMap = mapper.robot_map()
@@ -160,6 +164,9 @@ class AgentRun:
 
     def _map(self, scan: Scan) -> None:
         placement = self._mapper.add(scan)
+        pose = self._whereabouts.message(scan, placement, time.time())
+        if pose is not None:
+            self._outbox.send_pose(pose)
         self._scans_seen += 1
         self._changed |= placement.placed
         if placement.submap_finished or placement.lost:

@@ -24,7 +24,7 @@ from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
-from mapweave_agent.live_scans import scans_of
+from mapweave_agent.live.scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.source import ReplayClock, count_selected, parse_rate, told_once
 from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns

@@ -15,11 +15,12 @@ from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import (
     declare_alignment_publisher,
     declare_map_publisher,
+    declare_pose_publisher,
     declare_status_publisher,
 )
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, STATUS
-from mapweave_protocol.wire.messages import AlignmentMessage, StatusMessage, Traffic
+from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, POSE, STATUS
+from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage, StatusMessage, Traffic
 
 WAITING_QUERIES = 16
 
@@ -55,6 +56,8 @@ class Outbox:
             status_key = STATUS.build(team=self._team, robot=self._robot)
             live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
             self._maps = keep(declare_map_publisher(self._session, map_key))
+            pose_key = POSE.build(team=self._team, robot=self._robot)
+            self._poses = keep(declare_pose_publisher(self._session, pose_key))
             self._statuses = keep(declare_status_publisher(self._session, status_key))
             questions: zenoh.handlers.RingChannel[zenoh.Query]
             questions = zenoh.handlers.RingChannel(WAITING_QUERIES)
@@ -106,6 +109,10 @@ class Outbox:
     def send_status(self, message: StatusMessage) -> None:
         """Publish how far the robot is."""
         self._put("status", self._statuses, encode(message))
+
+    def send_pose(self, message: PoseMessage) -> None:
+        """Publish where the robot is."""
+        self._put("pose", self._poses, encode(message))
 
     def answer(self, robot_map: RobotMap) -> None:
         """Give who has asked the whole of `robot_map`, as published last, and what was found."""

@@ -23,6 +23,7 @@ from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.joint_status_message import frames_of
 from mapweave_protocol.wire.messages import JointStatusMessage
 
 POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
@@ -67,7 +68,9 @@ class Service:
         self._team = team
         self._store = store
         self._story = Story()
-        self._coordinator = Coordinator(parameters, last_version(store))
+        latest = last_version(store)
+        self._frames = frames_of(latest)
+        self._coordinator = Coordinator(parameters, latest)
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
@@ -130,6 +133,8 @@ class Service:
             # Stored first: what was published once must be there after a crash.
             self._store.add_version(built.draft.version, built.begun, built.payload)
             self._publisher.put(built.payload)
+            self._frames = frames_of(built.joint)
+            self._status_due = 0.0  # robots wait for their new frames
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
 
@@ -149,6 +154,7 @@ class Service:
             pending=self._coordinator.is_pending,
             maps=self._coordinator.maps_held,
             alignments=self._coordinator.alignments_held,
+            frames=self._frames,
         )
         self._statuses.put(encode(status))
 

@@ -17,6 +17,7 @@ from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
 from mapweave.mapping.tracking.pose_covariance import (
+    EXACT,
     PoseCovarianceParameters,
     pose_uncertainty,
     turn_uncertainty,
@@ -56,12 +57,18 @@ class Placement:
         Whether this call finished a submap.
     lost
         Whether this call started a new component.
+    pose
+        (3,) where the scan was taken [m, m, rad], component frame; None where it is not placed.
+    uncertainty
+        (4,) of it, as of `pose_uncertainty`, component frame; None as well.
     """
 
     placed: bool
     component: int
     submap_finished: bool
     lost: bool
+    pose: FloatArray | None = None
+    uncertainty: FloatArray | None = None
 
 
 class Mapper:
@@ -114,6 +121,7 @@ class Mapper:
         self._unsettled = False  # whether the last finished submap is being settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
+        self._held: FloatArray = EXACT  # how surely the last scan is placed, tracker's frame
         self._next_index = 0  # of scans that have no number, and the least of those that have
         self._is_finished = False
 
@@ -145,7 +153,9 @@ class Mapper:
             self._start_again()
             lost = True
             placed = seen.scan.index in self._merged
-        return Placement(placed, self._component, len(self._finished) > finished, lost)
+        pose, uncertainty = self._whereabouts() if placed else (None, None)
+        submap_finished = len(self._finished) > finished
+        return Placement(placed, self._component, submap_finished, lost, pose, uncertainty)
 
     def finish(self) -> RobotMap:
         """Finish the growing submap, as at the end of a log, and return the map.
@@ -185,6 +195,11 @@ class Mapper:
         self._merge_all(found)
         return any(each is seen for each, _ in found)
 
+    def _whereabouts(self) -> tuple[FloatArray, FloatArray]:
+        """Return (3,) where the last scan was placed and (4,) how surely, component frame."""
+        turned = turn_uncertainty(self._held, self._origin[2])
+        return se2.compose(self._origin, self._tracker.pose), turned
+
     def _merge_all(self, found: Found) -> None:
         for seen, tracked in found:
             self._merge(seen, tracked)
@@ -222,6 +237,8 @@ class Mapper:
             self._frame = tracked.pose
         local = se2.between(self._frame, tracked.pose)
         held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
+        if seen.scan.index == self._next_index - 1:  # not one that is found again with it
+            self._held = held
         held = turn_uncertainty(held, -self._frame[2])
         self._growing.add(seen.scan, seen.segments, local, held)
         self._merged[seen.scan.index] = seen

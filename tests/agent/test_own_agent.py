@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
+from mapweave_protocol.wire.messages import PoseMessage
 from tests.agent.test_agent import MAPWEAVE, PATIENCE, SCANS, Listener
 
 MILLIMETRE = 1.1e-3  # [m] what travels is rounded to
@@ -102,6 +104,33 @@ def test_a_program_feeds_an_agent_and_its_map_is_complete_when_the_block_ends(
         listener.until(lambda: listener.finished("a"))
     assert agent.skipped == 0
     assert_mapped(listener.maps["a"], scans)
+
+
+def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans, told, all_told = scans_of(logs[0]), list[PoseMessage](), threading.Event()
+
+    def tell(pose: PoseMessage) -> None:
+        told.append(pose)
+        if pose.scan_index == len(scans) - 1:
+            all_told.set()
+
+    with mapweave_agent.Agent(
+        "a", team, connect=endpoint, patience=PATIENCE, on_pose=tell
+    ) as agent:
+        for index, scan in enumerate(scans):
+            agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+            while agent.waiting or (told and told[-1].scan_index < index):
+                time.sleep(0.005)
+        assert all_told.wait(PATIENCE)
+    mapper, heard = Mapper("a"), {pose.scan_index: pose for pose in told}
+    assert sorted(heard) == list(range(told[0].scan_index, len(scans)))  # who subscribes is late
+    for index, scan in enumerate(scans):
+        placement = mapper.add(scan)
+        if index in heard and placement.pose is not None:
+            assert (heard[index].found, heard[index].component) == (True, "a/0")
+            np.testing.assert_allclose(np.array(heard[index].pose), placement.pose, atol=1e-9)
 
 
 def test_what_is_no_scan_is_refused_where_it_is_fed(endpoint: str, team: str) -> None:

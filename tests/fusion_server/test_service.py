@@ -191,6 +191,10 @@ def test_a_coordinator_says_what_it_holds(network: Network, found: Found) -> Non
     map_a, map_b, alignments = found
     assert status.maps == (MapVersion.of(map_a), MapVersion.of(map_b))
     assert status.alignments == ((alignments.reference, alignments.other),)
+    assert {name: place.frame for name, place in status.frames.items()} == {
+        "a/0": "a/0",
+        "b/0": "a/0",
+    }
 
 
 def test_who_listened_before_a_coordinator_with_a_long_history_gets_the_latest_then_the_next(

@@ -177,6 +177,16 @@ def declare_status_publisher(session: zenoh.Session, key: str) -> zenoh.Publishe
     return session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
 
 
+def declare_pose_publisher(session: zenoh.Session, key: str) -> zenoh.Publisher:
+    """Return a publisher of poses: sent at once, and before maps."""
+    return session.declare_publisher(
+        key,
+        congestion_control=zenoh.CongestionControl.DROP,
+        priority=zenoh.Priority.INTERACTIVE_HIGH,
+        express=True,
+    )
+
+
 def _declare_publisher(session: zenoh.Session, key: str, cached: int) -> ze.AdvancedPublisher:
     return ze.declare_advanced_publisher(
         session,

@@ -137,6 +137,29 @@ def test_a_placement_says_when_a_submap_was_finished(followed: Run) -> None:
     assert all(p.placed and not p.lost for p in followed.placements)
 
 
+def test_a_placement_says_where_the_scan_is_in_the_component_at_that_time() -> None:
+    scans, _ = scans_along(BUILDING, TOUR[:4], 1)
+    mapper = Mapper("a")
+    for scan in [*scans[:20], *scans[25:]]:  # a gap, after which it has to be found again
+        placement = mapper.add(scan)
+        submaps = mapper.robot_map().submaps
+        at = {
+            int(index): (s, pose)
+            for s in submaps
+            for index, pose in zip(s.trajectory.scan_index, s.trajectory.pose, strict=True)
+        }
+        assert placement.placed == (placement.pose is not None) == (scan.index in at)
+        if placement.pose is not None and placement.uncertainty is not None:
+            submap, pose = at[scan.index]
+            expected = se2.compose(submap.pose, pose)
+            np.testing.assert_allclose(se2.between(expected, placement.pose), 0, atol=1e-9)
+            assert submap.trajectory.uncertainty is not None
+            held = submap.trajectory.uncertainty[submap.trajectory.scan_index == scan.index][0]
+            np.testing.assert_allclose(placement.uncertainty[:3], held[:3])
+            turned = placement.uncertainty[3] - held[3] - submap.pose[2]
+            assert np.sin(turned) == pytest.approx(0, abs=1e-9)
+
+
 def test_a_kidnapped_robot_starts_a_component_where_nothing_fits(kidnapped: Run) -> None:
     assert sum(p.lost for p in kidnapped.placements) >= 1
     where = placed(kidnapped.map)

@@ -7,7 +7,7 @@ import pytest
 from mapweave.errors import FileError
 from mapweave.io.scan_range import ScanRange
 from mapweave.scan.scan import Scan
-from mapweave_agent.live_scans import BACKLOG, LiveScans, scans_of
+from mapweave_agent.live.scans import BACKLOG, LiveScans, scans_of
 
 SOON, NEVER = 0.01, 20.0  # [s]
 
