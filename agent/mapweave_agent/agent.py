@@ -1,8 +1,10 @@
 """A robot: its scans become its map, its map and its peers' maps become alignments."""
 
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import zenoh
@@ -36,7 +38,7 @@ from mapweave_protocol.wire.keys import (
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
-LIVE_POLL = 0.02  # [s] after which what arrived is attended to while no scan comes
+LIVE_POLL = 0.05  # [s] after which it is noticed that no scans come, or nothing arrives
 MAX_ARRIVALS = 64  # taken in at once, so that a flood does not hold up mapping
 
 _log = logging.getLogger(__name__)
@@ -98,6 +100,8 @@ class AgentRun:
         )
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
         self._inbox = Inbox()
+        self._mapping = threading.Lock()
+        self._live: LiveScans | None = None
         self._published: RobotMap = mapper.robot_map()
         self._scans_seen = 0
         self._changed = False
@@ -129,13 +133,31 @@ class AgentRun:
         MapweaveError
             If where the scans come from fails.
         """
+        self._live = scans
         with self._in_the_team():
-            while not (stopping() or scans.ended):
-                scan = scans.take(LIVE_POLL)
-                if scan is not None:
-                    self._map(scan)
-                self._attend(0.0)
+            with self._attending() as failed:
+                while not (stopping() or scans.ended or failed()):
+                    scan = scans.take(LIVE_POLL)
+                    if scan is not None:
+                        self._map(scan)
             self._compare_until(stopping)
+
+    @contextmanager
+    def _attending(self) -> Iterator[Callable[[], bool]]:
+        """Do all but mapping in a thread of its own; give a block what tells that it failed."""
+        over = threading.Event()
+
+        def attend() -> None:
+            while not over.is_set():
+                self._attend(LIVE_POLL)
+
+        with ThreadPoolExecutor(1, thread_name_prefix="attending") as thread:
+            attended = thread.submit(attend)
+            try:
+                yield attended.done
+            finally:
+                over.set()
+            attended.result()
 
     @contextmanager
     def _in_the_team(self) -> Iterator[None]:
@@ -163,7 +185,8 @@ class AgentRun:
             self._map(scan)
 
     def _map(self, scan: Scan) -> None:
-        placement = self._mapper.add(scan)
+        with self._mapping:
+            placement = self._mapper.add(scan)
         pose = self._whereabouts.message(scan, placement, time.time())
         if pose is not None:
             self._outbox.send_pose(pose)
@@ -248,13 +271,15 @@ class AgentRun:
         return found
 
     def _publish_map(self, *, complete: bool) -> None:
-        mapped = without_strays(self._mapper.robot_map())
+        self._changed = False
+        with self._mapping:
+            snapshot = self._mapper.snapshot()
+        mapped = without_strays(snapshot.robot_map())
         self._published = numbered_from(mapped, self._first)
         self._outbox.send_map(self._published, complete=complete)
         self._state.keep(self._published)
         self._comparisons.own_map(self._published, finished=self._finished)
         self._publication.published(time.monotonic())
-        self._changed = False
 
     def _publish_status(self) -> None:
         status = StatusMessage(
@@ -265,6 +290,8 @@ class AgentRun:
             scans_seen=self._scans_seen,
             scans_placed=_scans_placed(self._published),
             scans_total=self._total,
+            scans_skipped=0 if self._live is None else self._live.skipped,
+            scan_age=None if self._live is None else self._live.oldest(),
             components=len(self._published.components),
             submaps=len(self._published.submaps),
             map_version=self._published.version,

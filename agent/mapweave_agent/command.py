@@ -111,7 +111,8 @@ def _run(options: argparse.Namespace) -> int:
         BackendProcess(mapping.backend) as backend,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        mapper = Mapper(robot, new_boot(), mapping, backend, config)
+        live = source.live and not math.isinf(options.rate)
+        mapper = Mapper(robot, new_boot(), mapping, backend, config, live=live)
         parameters = AgentParameters(map_interval=options.map_interval)
         past = earlier.young(options.resume_within)
         first = earlier.first_component(session, team, robot)

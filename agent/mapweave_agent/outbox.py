@@ -23,6 +23,7 @@ from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, POSE,
 from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage, StatusMessage, Traffic
 
 WAITING_QUERIES = 16
+KINDS = "map", "alignment", "pose", "status"
 
 _log = logging.getLogger(__name__)
 
@@ -44,8 +45,8 @@ class Outbox:
         self._sender = MapSender()
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[tuple[str, str], AlignmentMessage] = {}
-        self._messages: Counter[str] = Counter()
-        self._bytes: Counter[str] = Counter()
+        self._messages = Counter(dict.fromkeys(KINDS, 0))
+        self._bytes = Counter(dict.fromkeys(KINDS, 0))
         self._declared = ExitStack()
 
     def __enter__(self) -> "Outbox":
@@ -81,6 +82,7 @@ class Outbox:
         return {
             kind: Traffic(messages=count, bytes=self._bytes[kind])
             for kind, count in self._messages.items()
+            if count
         }
 
     @property

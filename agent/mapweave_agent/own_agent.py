@@ -180,7 +180,7 @@ class Agent:
         session = stack.enter_context(open_session(self._endpoints, patience=self._patience))
         comparer = stack.enter_context(ComparisonWorker(compare))
         backend = stack.enter_context(BackendProcess(mapping.backend))
-        mapper = Mapper(self._robot, new_boot(), mapping, backend, self._config)
+        mapper = Mapper(self._robot, new_boot(), mapping, backend, self._config, live=True)
         return AgentRun(
             session,
             self._team,

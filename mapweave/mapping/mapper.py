@@ -13,6 +13,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
+from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
@@ -93,6 +94,9 @@ class Mapper:
         between; the map is the same.
     config
         What the map says that it was made with, unless other parameters are given.
+    live
+        Whether no scan may wait for the backend: a submap grows on while the one before it is
+        being settled. The map then depends on how fast that is.
     """
 
     def __init__(
@@ -102,6 +106,8 @@ class Mapper:
         parameters: MapperParameters | None = None,
         backend: BackendRunner | None = None,
         config: Config | None = None,
+        *,
+        live: bool = False,
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
@@ -117,8 +123,8 @@ class Mapper:
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         self._backend = backend or Backend(self.parameters.backend)
-        self._settling = self._growing  # what built the last finished submap
-        self._unsettled = False  # whether the last finished submap is being settled
+        self._live = live
+        self._unsettled: Unsettled | None = None  # the last finished submap, while it is settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
         self._held: FloatArray = EXACT  # how surely the last scan is placed, tracker's frame
@@ -174,8 +180,22 @@ class Mapper:
     def robot_map(self) -> RobotMap:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap(self._growing.line_map())]
-        submaps = (*self._with_walls(self._finished), *growing)
+        submaps = (*with_walls(self._finished, self._unsettled), *growing)
         return RobotMap(self.robot, self.boot, self._version, submaps, self._made_with)
+
+    def snapshot(self) -> MapSnapshot:
+        """Return what `robot_map` would draw now, to be drawn by another thread: takes a moment."""
+        empty = self._growing.is_empty
+        return MapSnapshot(
+            self.robot,
+            self.boot,
+            self._version,
+            self._made_with,
+            tuple(self._finished),
+            self._unsettled,
+            None if empty else self._submap(LineMap.empty()),
+            b"" if empty else MapSnapshot.packed(self._growing),
+        )
 
     def _numbered(self, scan: Scan) -> Scan:
         """Return `scan` with its index, which may be the next; errors as of `add`."""
@@ -222,7 +242,7 @@ class Mapper:
         if not self._growing.is_empty:
             self._finish_submap()
         if any(s.component == self._component for s in self._finished):
-            self._component = self._newest_component = self._spare() + self._unsettled
+            self._component = self._newest_component = self._spare() + (self._unsettled is not None)
         self._follows = False
         self._tracker = self._tracker.afresh()
         self._origin = self._frame = se2.IDENTITY
@@ -231,7 +251,7 @@ class Mapper:
 
     def _merge(self, seen: Observation, tracked: ScanMatch) -> None:
         """Merge a scan where it was found, tracker's frame, into the growing submap."""
-        if self._growing.is_full:
+        if self._growing.is_full and (self._unsettled is None or self._may_settle()):
             self._finish_submap()
         if self._growing.is_empty:
             self._frame = tracked.pose
@@ -253,19 +273,19 @@ class Mapper:
             FinishedSubmap(submap, scans, self._growing, self._follows, self._spare())
         )
         self._finished.append(submap)
-        self._settling, self._unsettled, self._follows = self._growing, True, True
+        self._unsettled, self._follows = Unsettled(self._growing), True
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._merged = {}
         self._version += 1
 
     def _adopt_settled(self) -> None:
         """Move everything to where it settled, the growing submap with the last scan before it."""
-        if not self._unsettled:
+        if self._unsettled is None:
             return
         settled = self._backend.take()
         if settled is None:
-            self._finished = self._with_walls(self._finished)
-        self._unsettled = False
+            self._finished = with_walls(self._finished, self._unsettled)
+        self._unsettled = None
         if settled is None:
             return
         before = _end(self._finished[-1])
@@ -285,11 +305,9 @@ class Mapper:
         """
         return self._newest_component + 1
 
-    def _with_walls(self, submaps: list[Submap]) -> list[Submap]:
-        """Return `submaps`, of the one that is being settled the walls, and not its outline."""
-        if not self._unsettled:
-            return submaps
-        return [*submaps[:-1], replace(submaps[-1], map=self._settling.line_map())]
+    def _may_settle(self) -> bool:
+        """Whether the next submap can be handed over now: `live`, no scan waits for the last."""
+        return not self._live or self._backend.is_ready
 
     def _submap(self, lines: LineMap) -> Submap:
         """Return the growing submap with its `lines`."""

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 import mapweave_agent
-from mapweave.errors import ArgumentError, InvalidIdError
+from mapweave.errors import ArgumentError, FileError, InvalidIdError
 from mapweave.io.readers import read_scans
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
+from mapweave_agent.agent import AgentRun
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.messages import PoseMessage
@@ -131,6 +132,50 @@ def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(
         if index in heard and placement.pose is not None:
             assert (heard[index].found, heard[index].component) == (True, "a/0")
             np.testing.assert_allclose(np.array(heard[index].pose), placement.pose, atol=1e-9)
+
+
+def test_scans_are_mapped_while_the_agent_is_held_up_with_everything_else(
+    endpoint: str, team: str, logs: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held_up, told = threading.Event(), list[int]()
+    attend = AgentRun._attend
+
+    def held(run: AgentRun, wait: float) -> None:
+        held_up.wait(PATIENCE)
+        attend(run, wait)
+
+    monkeypatch.setattr(AgentRun, "_attend", held)
+    with mapweave_agent.Agent(
+        "a", team, connect=endpoint, patience=PATIENCE, on_pose=lambda p: told.append(p.scan_index)
+    ) as agent:
+        for scan in scans_of(logs[0]):
+            agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+            while agent.waiting:
+                time.sleep(0.005)
+        deadline = time.monotonic() + PATIENCE
+        while SCANS - 1 not in told and time.monotonic() < deadline:
+            time.sleep(0.01)
+        held_up.set()
+    assert told[-1] == SCANS - 1
+    assert agent.skipped == 0
+
+
+def test_what_fails_beside_the_mapping_ends_the_agent(
+    endpoint: str, team: str, logs: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: AgentRun, *, complete: bool) -> None:
+        raise FileError("state", f"is full ({complete})")
+
+    monkeypatch.setattr(AgentRun, "_publish_map", fail)
+
+    def feed_all() -> None:
+        with mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE) as agent:
+            for scan in scans_of(logs[0]):
+                agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0])
+                time.sleep(0.05)
+
+    with pytest.raises(FileError, match="state: is full"):
+        feed_all()
 
 
 def test_what_is_no_scan_is_refused_where_it_is_fed(endpoint: str, team: str) -> None:

@@ -1,6 +1,7 @@
 """Scans on their way from the thread that takes them to the one that maps them."""
 
 import threading
+import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,10 +22,11 @@ class LiveScans:
 
     def __init__(self, backlog: int = BACKLOG) -> None:
         self._backlog = backlog
-        self._queue: deque[Scan] = deque()
+        self._queue: deque[tuple[Scan, float]] = deque()  # and when each came [s]
         self._changed = threading.Condition()
         self._closed = False
         self._failure: MapweaveError | None = None
+        self._oldest = 0.0
         self.skipped = 0
 
     @property
@@ -45,7 +47,7 @@ class LiveScans:
             if len(self._queue) == self._backlog:
                 self._queue.popleft()
                 self.skipped += 1
-            self._queue.append(scan)
+            self._queue.append((scan, time.monotonic()))
             self._changed.notify_all()
 
     def put_in_turn(self, scan: Scan) -> None:
@@ -53,7 +55,7 @@ class LiveScans:
         with self._changed:
             self._changed.wait_for(lambda: len(self._queue) < self._backlog or self._closed)
             if not self._closed:
-                self._queue.append(scan)
+                self._queue.append((scan, time.monotonic()))
                 self._changed.notify_all()
 
     def take(self, timeout: float) -> Scan | None:
@@ -68,10 +70,18 @@ class LiveScans:
             self._changed.wait_for(lambda: self._queue or self._closed, timeout)
             if self._queue:
                 self._changed.notify_all()
-                return self._queue.popleft()
+                scan, came = self._queue.popleft()
+                self._oldest = max(self._oldest, time.monotonic() - came)
+                return scan
             if self._failure is not None:
                 raise self._failure
             return None
+
+    def oldest(self) -> float:
+        """Return how long a scan waited [s] at most since this was asked last."""
+        with self._changed:
+            oldest, self._oldest = self._oldest, 0.0
+            return oldest
 
     def close(self, failure: MapweaveError | None = None) -> None:
         """Say that no more scans come, and why, where that is a failure."""

@@ -5,6 +5,7 @@ No clock and no network in here.
 
 import logging
 import math
+import threading
 
 import numpy as np
 
@@ -37,14 +38,16 @@ class Whereabouts:
         self._first = first
         self._placement: Placement | None = None
         self._status: JointStatusMessage | None = None
+        self._frames = threading.Lock()  # told by one thread, asked by another
         self._since: dict[str, tuple[str, int]] = {}  # own component to joint frame and version
 
     def coordinator(self, status: JointStatusMessage) -> None:
         """Take in which frames the latest joint map has."""
-        self._status = status
         own = {name for name in status.frames if name.rpartition("/")[0] == self._robot}
-        for name in sorted(own | set(self._since)):
-            self._note(name, status)
+        with self._frames:
+            self._status = status
+            for name in sorted(own | set(self._since)):
+                self._note(name, status)
 
     def message(self, scan: Scan, placement: Placement, now: float) -> PoseMessage | None:
         """Return where `scan` was taken, or the last one that fitted; None before there was one.
@@ -77,12 +80,13 @@ class Whereabouts:
         )
 
     def _joint(self, component: str, pose: FloatArray, covariance: FloatArray) -> JointPose | None:
-        if self._status is None or component not in self._status.frames:
-            return None
-        place = self._status.frames[component]
+        with self._frames:
+            if self._status is None or component not in self._status.frames:
+                return None
+            place = self._status.frames[component]
+            frame, since = self._since[component]
         to_joint = np.eye(3)
         to_joint[:2, :2] = se2.rotation(place.pose[2])
-        frame, since = self._since[component]
         return JointPose(
             frame=frame,
             since=since,

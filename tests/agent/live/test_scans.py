@@ -103,6 +103,17 @@ def test_a_reader_that_waits_for_its_turn_ends_when_nobody_takes_scans_any_more(
     assert not reader.is_alive()
 
 
+def test_how_long_a_scan_waited_at_most_is_told_once() -> None:
+    live = LiveScans()
+    live.put(scan(0))
+    time.sleep(5 * SOON)
+    assert live.take(NEVER) is not None
+    live.put(scan(1))
+    assert live.take(NEVER) is not None
+    assert live.oldest() >= 5 * SOON
+    assert live.oldest() == 0.0
+
+
 def test_of_scans_that_come_faster_than_they_are_taken_the_newest_is_next() -> None:
     with scans_of(Source(50), ScanRange()) as live:
         while not live.ended and live.skipped < 49:

@@ -160,6 +160,22 @@ def test_a_placement_says_where_the_scan_is_in_the_component_at_that_time() -> N
             assert np.sin(turned) == pytest.approx(0, abs=1e-9)
 
 
+def test_a_snapshot_is_drawn_as_the_map_was_then_however_far_the_robot_has_driven_on() -> None:
+    scans, _ = scans_along(BUILDING, TOUR[:5], 1)
+    mapper, then = Mapper("a"), []
+    for scan in scans:
+        mapper.add(scan)
+        if scan.index % 15 == 0:
+            then.append((mapper.snapshot(), mapper.robot_map()))
+    assert len({len(drawn.submaps) for _, drawn in then}) > 1
+    for snapshot, expected in then:
+        drawn = snapshot.robot_map()
+        assert (drawn.version, len(drawn.submaps)) == (expected.version, len(expected.submaps))
+        for submap, other in zip(drawn.submaps, expected.submaps, strict=True):
+            np.testing.assert_array_equal(submap.map.segments, other.map.segments)
+            np.testing.assert_array_equal(submap.trajectory.pose, other.trajectory.pose)
+
+
 def test_a_kidnapped_robot_starts_a_component_where_nothing_fits(kidnapped: Run) -> None:
     assert sum(p.lost for p in kidnapped.placements) >= 1
     where = placed(kidnapped.map)
@@ -274,6 +290,8 @@ class JoinsAll:
         """Take the next submap."""
         self._submaps.append(replace(finished.submap, component=0))
 
+    is_ready = True
+
     def take(self) -> BackendResult:
         """Return where all are."""
         poses = np.array([s.pose for s in self._submaps])
@@ -295,6 +313,28 @@ def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> No
     assert len(numbers) >= 2
     assert numbers == sorted(set(numbers))
     assert mapper.finish().components == [0]
+
+
+class Slow(JoinsAll):
+    """Is not ready until it is told to be; nobody may wait for it."""
+
+    is_ready = False
+
+    def take(self) -> BackendResult:
+        """Fail where somebody waits."""
+        assert self.is_ready, "a scan has waited"
+        return super().take()
+
+
+def test_live_no_scan_waits_for_a_submap_to_be_settled_and_the_next_one_grows_on() -> None:
+    backend = Slow()
+    mapper = Mapper("a", backend=backend, live=True)
+    scans, _ = scans_along(BUILDING, TOUR, 1)
+    for scan in scans[:-1]:
+        assert mapper.add(scan).placed
+    assert len(mapper.robot_map().submaps) == 2  # the first, and one that grows
+    backend.is_ready = True
+    assert mapper.add(scans[-1]).submap_finished
 
 
 class CutsTheSecond:
@@ -325,6 +365,8 @@ class CutsTheSecond:
         components = np.array([s.component for s in self._submaps])
         poses = np.array([s.pose for s in self._submaps])
         self._settled = BackendResult(components, poses, renewed, used)
+
+    is_ready = True
 
     def take(self) -> BackendResult | None:
         """Return where all are."""
