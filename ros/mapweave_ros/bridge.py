@@ -4,7 +4,7 @@ import argparse
 import logging
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from mapweave.cli import Command
 from mapweave.maps import JointMap
@@ -37,40 +37,51 @@ def _run(options: argparse.Namespace) -> int:
     team, endpoints = connection_of(options)
     network = Ros2Network.parse(options.to, endpoints)
     stopping = stop_on_signal()
-    failures: list[BaseException] = []
     with Ros2Output.of_team(network, team) as output:
-
-        def tell(news: Iterator[JointMap] | Iterator[PoseMessage]) -> None:
-            try:
-                for one in news:
-                    output.tell(one)
-            except BaseException as error:  # noqa: BLE001 - raised again where it is seen
-                failures.append(error)
-
-        def over() -> bool:
-            return bool(failures) or ended.is_set()
-
-        ended = threading.Event()
-        threads = _started(
-            lambda: tell(joint_maps(team, connect=endpoints, stopping=over)),
-            lambda: tell(poses(team, connect=endpoints, stopping=over)),
-        )
-        while not (stopping() or failures):
-            ended.wait(POLL)
-        ended.set()
-        for thread in threads:
-            thread.join(FAREWELL)
-    if failures:
-        raise failures[0]
+        _Following(team, endpoints, output).run(stopping)
     return 0
 
 
-def _started(*tasks: Callable[[], None]) -> list[threading.Thread]:
-    """Return threads that do `tasks`; they end with the process where a router never answers."""
-    threads = [threading.Thread(target=task, daemon=True) for task in tasks]
-    for thread in threads:
-        thread.start()
-    return threads
+class _Following:
+    """Leaves what a team says at an output, each kind from a thread of its own."""
+
+    def __init__(self, team: str, endpoints: Sequence[str], output: Ros2Output) -> None:
+        self._team = team
+        self._endpoints = endpoints
+        self._output = output
+        self._over = threading.Event()
+        self._failure: BaseException | None = None
+
+    def run(self, stopping: Callable[[], bool]) -> None:
+        """Follow until `stopping`, or one of them fails.
+
+        Raises
+        ------
+        MapweaveError
+            If one has failed.
+        """
+        # They end with the process where a router never answers.
+        threads = [
+            threading.Thread(target=self._follow, args=(subscribe,), daemon=True)
+            for subscribe in (joint_maps, poses)
+        ]
+        for thread in threads:
+            thread.start()
+        while not (stopping() or self._over.wait(POLL)):
+            pass
+        self._over.set()
+        for thread in threads:
+            thread.join(FAREWELL)
+        if self._failure is not None:
+            raise self._failure
+
+    def _follow(self, subscribe: Callable[..., Iterator[JointMap | PoseMessage]]) -> None:
+        try:
+            for news in subscribe(self._team, connect=self._endpoints, stopping=self._over.is_set):
+                self._output.tell(news)
+        except BaseException as error:  # noqa: BLE001 - raised again where it is seen
+            self._failure = error
+            self._over.set()
 
 
 command = Command("Show a team's joint map and poses on a ROS 2 network.", _configure, _run)

@@ -146,15 +146,6 @@ class Messages:
         colors: Sequence[object] = (),
     ) -> object:
         width = 0.05 if kind == LINES else 0.5  # [m] of a line, or of letters
-        image = self._make(
-            "sensor_msgs/msg/CompressedImage",
-            header=self._header("", 0.0),
-            format="",
-            data=np.zeros(0, dtype=np.uint8),
-        )
-        mesh = self._make(
-            "visualization_msgs/msg/MeshFile", filename="", data=np.zeros(0, dtype=np.uint8)
-        )
         return self._make(
             "visualization_msgs/msg/Marker",
             header=header,
@@ -169,14 +160,27 @@ class Messages:
             frame_locked=frame_locked,
             points=list(points),
             colors=list(colors),
-            texture_resource="",
-            texture=image,
-            uv_coordinates=[],
             text=text,
-            mesh_resource="",
-            mesh_file=mesh,
-            mesh_use_embedded_materials=False,
+            **self._without_textures(),
         )
+
+    def _without_textures(self) -> dict[str, Any]:
+        """Return the fields of a marker that has neither texture nor mesh."""
+        nothing = np.zeros(0, dtype=np.uint8)
+        image = self._make(
+            "sensor_msgs/msg/CompressedImage",
+            header=self._header("", 0.0),
+            format="",
+            data=nothing,
+        )
+        return {
+            "texture_resource": "",
+            "texture": image,
+            "uv_coordinates": [],
+            "mesh_resource": "",
+            "mesh_file": self._make("visualization_msgs/msg/MeshFile", filename="", data=nothing),
+            "mesh_use_embedded_materials": False,
+        }
 
     def _transform(self, transform: Transform) -> object:
         pose = self._pose(transform.pose)
