@@ -35,7 +35,7 @@ from mapweave_protocol.wire.keys import (
     MAP,
     STATUS,
 )
-from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
+from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
 LIVE_POLL = 0.05  # [s] after which it is noticed that no scans come, or nothing arrives
@@ -43,6 +43,7 @@ MAX_ARRIVALS = 64  # taken in at once, so that a flood does not hold up mapping
 
 _log = logging.getLogger(__name__)
 Stopping = Callable[[], bool]
+Tell = Callable[[RobotMap | PoseMessage], None]
 
 
 class AgentRun:
@@ -66,6 +67,8 @@ class AgentRun:
         The robot's earlier runs that belong to the team's map, the earliest first.
     first
         The number of this run's first component, above those of all runs before it.
+    tell
+        Told each map and pose that is published, in whatever thread; it must return at once.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class AgentRun:
         state: StateFolder,
         past: Sequence[PastRun] = (),
         first: int = 0,
+        tell: Tell = lambda _: None,
     ) -> None:
         self._session = session
         self._team = team
@@ -89,6 +93,7 @@ class AgentRun:
         self._state = state
         self._past = {run.state: run for run in past}
         self._first = first
+        self._tell = tell
         self._publication = PublicationSchedule(parameters.map_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
         if past:
@@ -190,6 +195,7 @@ class AgentRun:
         pose = self._whereabouts.message(scan, placement, time.time())
         if pose is not None:
             self._outbox.send_pose(pose)
+            self._tell(pose)
         self._scans_seen += 1
         self._changed |= placement.placed
         if placement.submap_finished or placement.lost:
@@ -277,6 +283,7 @@ class AgentRun:
         mapped = without_strays(snapshot.robot_map())
         self._published = numbered_from(mapped, self._first)
         self._outbox.send_map(self._published, complete=complete)
+        self._tell(self._published)
         self._state.keep(self._published)
         self._comparisons.own_map(self._published, finished=self._finished)
         self._publication.published(time.monotonic())

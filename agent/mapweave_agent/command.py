@@ -24,6 +24,7 @@ from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
+from mapweave_agent.live.ros2_output import output_of
 from mapweave_agent.live.scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.source import ReplayClock, count_selected, parse_rate, told_once
@@ -72,6 +73,12 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="least time between two messages of the growing submap [s] (default %(default)g)",
     )
     parser.add_argument(
+        "--publish",
+        metavar="NETWORK",
+        help="show the robot's map and pose on a ROS 2 network as well: ros2: for the team's, or"
+        " such as 'ros2:?connect=tcp/127.0.0.1:7447&domain=0'",
+    )
+    parser.add_argument(
         "--state",
         type=Path,
         metavar="DIR",
@@ -99,6 +106,7 @@ def _run(options: argparse.Namespace) -> int:
     step, warn = config.sensor.angular_step, told_once(_log.warning)
     source = open_source(options.source, ReadOptions(False, step, options.topic, warn, endpoints))
     total = count_selected(options.source, source, options.scans)
+    output = output_of(options.publish, robot, endpoints, source)
     earlier = EarlierRuns.of(team, robot, options.state)
 
     def tell_waiting() -> None:
@@ -107,6 +115,7 @@ def _run(options: argparse.Namespace) -> int:
     mapping = MapperParameters.of(config)
     compare = partial(align, parameters=FusionParameters.of(config))
     with (
+        output as tell,
         ComparisonWorker(compare) as comparer,
         BackendProcess(mapping.backend) as backend,
         open_session(endpoints, on_wait=tell_waiting) as session,
@@ -119,7 +128,7 @@ def _run(options: argparse.Namespace) -> int:
         past = earlier.young(options.resume_within)
         first = earlier.first_component(session, team, robot)
         run = AgentRun(
-            session, team, mapper, comparer, total, parameters, earlier.folder, past, first
+            session, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
         )
         _run_on(source, run, options)
     return 0

@@ -33,6 +33,7 @@ from mapweave.maps import (
     Trajectory,
 )
 from mapweave.reasons import Reason, Status
+from mapweave.scan.coverage import coverage
 
 _EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
 _METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
@@ -282,11 +283,14 @@ def _cause(cause: Reason) -> dict[str, object]:
 
 def _component(component: JointComponent) -> dict[str, object]:
     confidences = _by_polyline(component.map, component.segment_confidence)
+    searched = coverage(component.map)
     return {
         "robots": {name: _pose(pose) for name, pose in component.robots.items()},
         "confidence": _number(component.confidence, _RATIOS),
         **_line_map(component.map),
         "segment_confidence": [np.round(row, _METRES).tolist() for row in confidences],
+        "explored_m2": round(searched.explored, 1),
+        "frontiers": [np.round(line, _METRES).tolist() for line in searched.frontiers],
     }
 
 

@@ -4,17 +4,12 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from urllib.parse import parse_qsl
 
-from mapweave_protocol.link.session import default_endpoints, session_config
 from mapweave_ros.errors import Ros2SourceError
 from mapweave_ros.mounting import Mounting
+from mapweave_ros.network import SCHEME, Ros2Network
 
-SCHEME = "ros2:"
-DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
-MAX_DOMAIN = 232  # of ROS 2
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
-_NUMBER = re.compile(r"[0-9]{1,3}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +28,12 @@ class Ros2Address:
     ----------
     lasers
         One, or several that each say where they sit.
-    endpoints
-        Of the network's router.
-    domain
-        The number that keeps robots on one network apart (``ROS_DOMAIN_ID``).
+    network
+        Where.
     """
 
     lasers: tuple[Laser, ...]
-    endpoints: tuple[str, ...]
-    domain: int
+    network: Ros2Network
 
     @classmethod
     def parse(
@@ -50,36 +42,19 @@ class Ros2Address:
         endpoints: Sequence[str] | None = None,
         environment: Mapping[str, str] = os.environ,
     ) -> "Ros2Address":
-        """Return what `name` says.
-
-        Parameters
-        ----------
-        endpoints
-            Where the router is if `name` does not say it; None for the usual place.
-        environment
-            Has the domain if `name` does not.
+        """Return what `name` says; parameters as of `Ros2Network.parse`.
 
         Raises
         ------
-        Ros2SourceError
+        Ros2SourceError, Ros2NetworkError
             If it is no such word.
         EndpointError
             If an endpoint is not one.
         """
-        topics, _, query = name.removeprefix(SCHEME).partition("?")
-        settings = dict(parse_qsl(query, keep_blank_values=True))
-        unknown = sorted(settings.keys() - {"connect", "domain"})
-        if unknown:
-            raise Ros2SourceError(name, f"nothing is known of {unknown[0]!r}")
+        topics = name.removeprefix(SCHEME).partition("?")[0]
         lasers = tuple(_laser(name, text) for text in topics.split("+"))
         _check_lasers(name, lasers)
-        asked = settings.get("connect")
-        reached = default_endpoints() if endpoints is None else tuple(endpoints)
-        if asked is not None:
-            reached = tuple(asked.split(","))
-        session_config(reached)  # so that a wrong one is found now
-        domain = settings.get("domain", environment.get(DOMAIN_VARIABLE) or "0")
-        return cls(lasers, reached, _domain(name, domain))
+        return cls(lasers, Ros2Network.parse(name, endpoints, environment))
 
 
 def _laser(name: str, text: str) -> Laser:
@@ -99,9 +74,3 @@ def _check_lasers(name: str, lasers: Sequence[Laser]) -> None:
     bare = [laser.topic for laser in lasers if laser.mounting is None]
     if len(lasers) > 1 and bare:
         raise Ros2SourceError(name, f"of several lasers, {bare[0]} does not say where it sits")
-
-
-def _domain(name: str, text: str) -> int:
-    if not _NUMBER.fullmatch(text) or int(text) > MAX_DOMAIN:
-        raise Ros2SourceError(name, f"domain {text!r} is no number from 0 to {MAX_DOMAIN}")
-    return int(text)

@@ -21,3 +21,23 @@ class Ros2SourceError(MapweaveError):
         )
         self.name = name
         self.problem = problem
+
+
+class Ros2NetworkError(MapweaveError):
+    """What does not name a ROS 2 network.
+
+    Parameters
+    ----------
+    word
+        The word.
+    problem
+        What is wrong with it.
+    """
+
+    def __init__(self, word: str, problem: str) -> None:
+        super().__init__(
+            f"{word!r}: {problem}; expected ros2:… with, where they differ,"
+            " ?connect=ENDPOINT&domain=N&distro=NAME"
+        )
+        self.word = word
+        self.problem = problem

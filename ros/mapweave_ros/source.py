@@ -1,22 +1,22 @@
 """``ros2:/scan``: the scans of one or several lasers, as they are said on a ROS 2 network."""
 
-import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
+import numpy as np
 import zenoh
 
+from mapweave.geometry.arrays import FloatArray
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags.laser_messages import UnreadableMessageError
 from mapweave.scan.scan import Scan
-from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.inbox import Arrival, Inbox
-from mapweave_protocol.link.session import open_session
 from mapweave_ros.address import Laser, Ros2Address
 from mapweave_ros.graph import topics_of_type
 from mapweave_ros.mounting import Mounting
+from mapweave_ros.output import open_when_there
 from mapweave_ros.refusals import Refusals
 from mapweave_ros.scan_messages import ScanMessages
 from mapweave_ros.several_lasers import SeveralLasers
@@ -25,8 +25,6 @@ from mapweave_ros.topics import DDS_LASER_SCAN, TopicKeys
 POLL = 0.1  # [s] after which it is noticed that nobody wants any more
 SILENT = 5.0  # [s] without a scan, after which it is said what else there is
 FORGOTTEN = 2.0  # [s] after which another publisher of a topic is listened to
-
-_log = logging.getLogger(__name__)
 
 
 def open_ros2(name: str, options: ReadOptions) -> "Ros2Source":
@@ -63,6 +61,16 @@ class Ros2Source:
         self._messages = ScanMessages()
         self._closed = threading.Event()
 
+    @property
+    def mounting(self) -> FloatArray:
+        """(3,) where the robot's scans are taken from, on the robot [m, m, rad].
+
+        A single laser is turned as the robot is; scans of several are from its middle.
+        """
+        mounting = self._lasers[0].mounting
+        alone = len(self._lasers) == 1 and mounting is not None
+        return np.array([mounting.x, mounting.y, 0.0]) if alone and mounting else np.zeros(3)
+
     def count(self) -> None:
         """Nobody knows."""
 
@@ -74,10 +82,12 @@ class Ros2Source:
         """Yield scans as they come, until `close`; what is no scan is told, and left out."""
         inbox = Inbox()
         with ExitStack() as stack:
-            session = self._open(stack)
+            session = open_when_there(stack, self._address.network, self._closed.is_set)
             if session is None:
                 return
-            topics = [_Topic(laser, self._address.domain, self._tell) for laser in self._lasers]
+            topics = [
+                _Topic(laser, self._address.network.domain, self._tell) for laser in self._lasers
+            ]
             for key in (key for topic in topics for key in topic.keys):
                 stack.enter_context(session.declare_subscriber(key, inbox.put))
             yield from self._combined(self._heard(session, inbox, topics))
@@ -85,18 +95,6 @@ class Ros2Source:
     @property
     def _lasers(self) -> tuple[Laser, ...]:
         return self._address.lasers
-
-    def _open(self, stack: ExitStack) -> zenoh.Session | None:
-        """Return a session as soon as the router is there; None where nobody waits any more."""
-        endpoints, told = self._address.endpoints, False
-        while not self._closed.is_set():
-            try:
-                return stack.enter_context(open_session(endpoints, patience=0.0))
-            except UnreachableError:
-                if not told:
-                    _log.info("waiting for ROS 2's router at %s", ", ".join(endpoints))
-                told = True
-        return None
 
     def _heard(
         self, session: zenoh.Session, inbox: Inbox, topics: list["_Topic"]
@@ -128,13 +126,11 @@ class Ros2Source:
             yield from together.add(laser.topic, scan)
 
     def _tell_silence(self, session: zenoh.Session) -> None:
-        there = topics_of_type(session, self._address.domain, DDS_LASER_SCAN, POLL)
+        there = topics_of_type(session, self._address.network.domain, DDS_LASER_SCAN, POLL)
         asked = ", ".join(laser.topic for laser in self._lasers)
         known = f"those announced are {', '.join(there)}" if there else "none is announced"
-        self._tell(
-            f"no scan yet at {asked} in domain {self._address.domain}; of topics with LaserScan"
-            f" {known}"
-        )
+        where = f"{asked} in domain {self._address.network.domain}"
+        self._tell(f"no scan yet at {where}; of topics with LaserScan {known}")
 
 
 class _Topic:

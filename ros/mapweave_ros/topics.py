@@ -7,7 +7,18 @@ publishes at the topic's name. Both leave out the slash that the topic begins wi
 
 from dataclasses import dataclass
 
-DDS_LASER_SCAN = "sensor_msgs::msg::dds_::LaserScan_"
+from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN
+
+TYPE_HASH_NOT_SUPPORTED = "TypeHashNotSupported"
+
+
+def dds_type_of(kind: str) -> str:
+    """Return how DDS names a type such as ``sensor_msgs/msg/LaserScan``."""
+    package, _, name = kind.split("/")
+    return f"{package}::msg::dds_::{name}_"
+
+
+DDS_LASER_SCAN = dds_type_of(LASER_SCAN)
 
 
 @dataclass(frozen=True, slots=True)

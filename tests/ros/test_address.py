@@ -8,14 +8,15 @@ from mapweave.errors import MissingExtraError
 from mapweave.io.readers.options import ReadOptions
 from mapweave_protocol.errors import EndpointError
 from mapweave_ros.address import Laser, Ros2Address
-from mapweave_ros.errors import Ros2SourceError
+from mapweave_ros.errors import Ros2NetworkError, Ros2SourceError
 from mapweave_ros.mounting import Mounting
+from mapweave_ros.network import Ros2Network
 from mapweave_ros.source import open_ros2
 
 
 def test_a_topic_alone_is_on_the_teams_network_in_the_domain_of_the_environment() -> None:
     address = Ros2Address.parse("ros2:/r1/scan", ["tcp/router:7447"], {"ROS_DOMAIN_ID": "12"})
-    assert address == Ros2Address((Laser("/r1/scan"),), ("tcp/router:7447",), 12)
+    assert address == Ros2Address((Laser("/r1/scan"),), Ros2Network(("tcp/router:7447",), 12))
 
 
 def test_a_word_says_network_domain_and_where_each_laser_sits() -> None:
@@ -24,7 +25,7 @@ def test_a_word_says_network_domain_and_where_each_laser_sits() -> None:
     )
     front, rear = Mounting(0.2, -0.1, math.radians(45)), Mounting(-0.2, 0.0, math.pi, True)
     assert address.lasers == (Laser("/front", front), Laser("/rear", rear))
-    assert (address.endpoints, address.domain) == (("tcp/a:1", "tcp/b:2"), 232)
+    assert address.network == Ros2Network(("tcp/a:1", "tcp/b:2"), 232)
 
 
 @pytest.mark.parametrize(
@@ -39,13 +40,19 @@ def test_a_word_says_network_domain_and_where_each_laser_sits() -> None:
         ("ros2:/a@0,0,0+/a@0,0,0", "names a topic twice"),
         ("ros2:/a?domain=233", "domain '233' is no number from 0 to 232"),
         ("ros2:/a?domain=", "domain ''"),
+        ("ros2:/a?distro=22.04", "distro '22.04' is no release"),
         ("ros2:/a?router=tcp/a:1", "nothing is known of 'router'"),
     ],
 )
 def test_what_names_no_laser_is_refused_in_one_line(word: str, problem: str) -> None:
-    with pytest.raises(Ros2SourceError, match=problem) as raised:
+    with pytest.raises((Ros2SourceError, Ros2NetworkError), match=problem) as raised:
         Ros2Address.parse(word, environment={})
     assert "\n" not in str(raised.value)
+
+
+def test_humble_names_no_hashes() -> None:
+    assert not Ros2Network.parse("ros2:?distro=humble", environment={}).hashed
+    assert Ros2Network.parse("ros2:", environment={}).hashed
 
 
 def test_an_endpoint_that_is_none_is_refused_before_anybody_listens() -> None:
