@@ -115,6 +115,11 @@ class Coordinator:
         return tuple(MapVersion.of(self._maps[run]) for run in sorted(self._maps))
 
     @property
+    def maps(self) -> tuple[RobotMap, ...]:
+        """The maps of all runs of all robots."""
+        return tuple(sorted(self._maps.values(), key=lambda m: (m.robot, min(m.components))))
+
+    @property
     def alignments_held(self) -> tuple[tuple[MapVersion, MapVersion], ...]:
         """Of which states of the maps the alignments of each pair are that are here."""
         return tuple((held.reference, held.other) for held in self._alignments.values())
@@ -193,9 +198,8 @@ class Coordinator:
         """Return the draft of the next version, made of all that is known; `finish` must follow."""
         if self._draft is not None:
             raise RuntimeError("the last draft is not finished")
-        maps = tuple(sorted(self._maps.values(), key=lambda m: (m.robot, min(m.components))))
         alignments = tuple(self._alignments_in_force())
-        self._draft = Draft(self._version + 1, maps, alignments, self._judged)
+        self._draft = Draft(self._version + 1, self.maps, alignments, self._judged)
         self._begun, self._urgency = now, Urgency.NONE
         return self._draft
 

@@ -16,6 +16,7 @@ from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameter
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_protocol.link import session
 from mapweave_protocol.link.asking import request_all_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
@@ -48,6 +49,8 @@ class Service:
         Of the coordinator.
     config
         Of how maps become one; the default one where none is given.
+    feed
+        Is handed every version, and every second how robots and coordinator are.
 
     Raises
     ------
@@ -62,6 +65,7 @@ class Service:
         store: Store,
         parameters: CoordinatorParameters,
         config: Config | None = None,
+        feed: Feed | None = None,
     ) -> None:
         self._session = zenoh_session
         self._team = team
@@ -74,6 +78,9 @@ class Service:
         self._boot = keys.new_boot()
         self._status_due = 0.0
         self._builder = VersionBuilder(store.series, config or Config())
+        self._started = time.time()
+        self._feed = feed or Feed()
+        self._feed.show_version(store.latest_version, self._coordinator.maps)
 
     def run(self, stopping: Callable[[], bool]) -> None:
         """Serve until `stopping`; then publish what is pending.
@@ -130,6 +137,7 @@ class Service:
             # Stored first: what was published once must be there after a crash.
             self._store.add_version(built.draft.version, built.begun, built.payload)
             self._publisher.put(built.payload)
+            self._feed.show_version(built.draft.version, built.draft.maps)
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
 
@@ -151,6 +159,16 @@ class Service:
             alignments=self._coordinator.alignments_held,
         )
         self._statuses.put(encode(status))
+        self._feed.show_team(
+            self._intake.reports,
+            CoordinatorReport(
+                boot=self._boot,
+                started=self._started,
+                stamp=status.stamp,
+                pending=status.pending,
+                refused=self._intake.refused,
+            ),
+        )
 
     @contextmanager
     def _announced(self) -> Iterator[None]:

@@ -111,6 +111,11 @@ class Store:
         """Return the message of version `number`, None when there is none."""
         return self._blob("SELECT message FROM version WHERE number = ?", number)
 
+    def versions_created(self, since: int, limit: int) -> list[tuple[int, float]]:
+        """Return number and time [s since 1970] of at most `limit` versions after `since`."""
+        sql = "SELECT number, created FROM version WHERE number > ? ORDER BY number LIMIT ?"
+        return [(int(number), float(t)) for number, t in self._rows(sql, since, limit)]
+
     def versions_since(self, number: int) -> Iterator[bytes]:
         """Yield the messages of all versions after `number`, oldest first, one at a time."""
         for wanted in range(max(number, 0) + 1, self.latest_version + 1):

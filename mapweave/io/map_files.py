@@ -133,14 +133,18 @@ def write_joint(path: str | Path, joint: JointMap) -> None:
     FileError
         If it cannot be written.
     """
-    content = {
+    _write(path, joint_content(joint))
+
+
+def joint_content(joint: JointMap) -> dict[str, object]:
+    """Return what is in the file of `joint`, for `json.dumps`."""
+    return {
         "format": JOINT_FORMAT,
         "version": joint.version,
         **_made_with(joint.made_with),
-        "alignments": [_alignment(alignment) for alignment in joint.alignments],
+        "alignments": [alignment_content(alignment) for alignment in joint.alignments],
         "components": [_component(component) for component in joint.components],
     }
-    _write(path, content)
 
 
 def _content(path: Path) -> bytes:
@@ -231,7 +235,8 @@ def _by_polyline(lines: LineMap, values: _Values) -> list[_Values]:
     return np.split(values, starts) if len(values) else []
 
 
-def _alignment(alignment: Alignment) -> dict[str, object]:
+def alignment_content(alignment: Alignment) -> dict[str, object]:
+    """Return one of the ``alignments`` of a joint map's file."""
     return {
         "reference": alignment.reference,
         "other": alignment.other,
