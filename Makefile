@@ -28,7 +28,7 @@ $(KERNELS): $(STAMP) mapweave/kernels/CMakeLists.txt $(wildcard mapweave/kernels
 	@touch $@
 
 demo: $(KERNELS)
-	$(BIN)/mapweave team --world office --robots 3 --output demo
+	$(BIN)/mapweave team --world office --robots 3 --output demo --http 127.0.0.1:0
 
 lint: $(KERNELS)
 	$(BIN)/ruff check .

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mapweave.cli import add_config_argument, argument, positive
 from mapweave_deploy.sim.simulation import BUILDERS
+from mapweave_fusion_server.web.address import loopback_address
 from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import MAX_PORT
 
@@ -70,6 +71,13 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         type=argument(_endpoint),
         metavar="ENDPOINT",
         help="where the router listens, such as tcp/127.0.0.1:7447 (default: a free port)",
+    )
+    parser.add_argument(
+        "--http",
+        type=argument(loopback_address),
+        metavar="HOST:PORT",
+        help="serve the live page there, on this machine only; port 0 takes a free one; at a"
+        " terminal it stays until Ctrl-C",
     )
     parser.add_argument(
         "--timeout",

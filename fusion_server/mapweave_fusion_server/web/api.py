@@ -103,11 +103,10 @@ class Api:
         return Response(content, 200, headers, TYPES.get(suffix, "application/json"))
 
     async def _paths(self, request: Request) -> Response:
+        """Answer with the paths of a version, or that they are no longer kept."""
         number = request.path_params["number"]
-        content = self._known.paths.json(number)
-        if content is None:
-            raise HTTPException(404, f"the paths of version {number} are not kept")
-        return _json(content)
+        nothing = {"version": number, "kept": False, "components": {}, "robots": {}}
+        return _json(self._known.paths.json(number) or to_json(nothing))
 
     async def _part(self, request: Request) -> Response:
         """Answer with a robot's own lines of a component, as they are now."""

@@ -62,7 +62,7 @@ def paths_content(version: int, maps: Iterable[RobotMap]) -> dict[str, Any]:
             newest[robot_map.robot] = last[:2]
             components[last[1]]["last"] = last[2]
     robots = {robot: component for robot, (_, component) in newest.items()}
-    return {"version": version, "components": components, "robots": robots}
+    return {"version": version, "kept": True, "components": components, "robots": robots}
 
 
 def _last_pose(robot_map: RobotMap) -> tuple[int, str, list[float]] | None:
