@@ -8,9 +8,9 @@ import { metres, robotOf } from "./format.js";
 import { onThemeChange } from "./palette.js";
 import { floorOf, linesOf, runsOf, sceneOf } from "./scene.js";
 import { compose } from "./se2.js";
-import { Stage } from "./stage.js";
+import { MOVE, Stage } from "./stage.js";
 
-const MARGINS = { left: 70, right: 40, top: 78, bottom: 62 }; // [px] for what lies over the map
+const MARGINS = { left: 70, right: 40, top: 92, bottom: 66 }; // [px] for what lies over the map
 const SMALL_MARGINS = { left: 22, right: 22, top: 92, bottom: 66 };
 
 export class MapView {
@@ -28,6 +28,7 @@ export class MapView {
   #alive = new Map();
   #parts = new Map();
   #changes = null;
+  #glide = null;
 
   /** @param {object} on  `measured` takes a text or null, `key` a key that is not the map's own. */
   constructor(canvas, on) {
@@ -52,7 +53,7 @@ export class MapView {
     this.#tracks = new Map(Object.entries(paths.components).map(([name, { paths: runs, last }]) =>
       [name, { path: runsOf(runs), start: runs[0]?.[0], last }]));
     this.#places = paths.robots;
-    if (this.#fits) this.fit();
+    if (this.#fits) this.fit(this.stage.isMoving);
     this.#follow();
     this.refresh();
   }
@@ -82,13 +83,16 @@ export class MapView {
     this.refresh();
   }
 
-  /** Show all there is, now and as it grows, until a hand moves the map. */
-  fit() {
+  /** Show all there is, now and as it grows, until a hand moves the map; at once, or gliding. */
+  fit(gliding = false) {
     this.#fits = true;
     this.following = null;
     const corners = this.stage.corners;
-    const margins = this.camera.width < 600 ? SMALL_MARGINS : MARGINS;
-    if (corners.length) Object.assign(this.camera, this.camera.fitting(corners, margins));
+    if (corners.length === 0) return;
+    const to = this.camera.fitting(corners, this.camera.width < 600 ? SMALL_MARGINS : MARGINS);
+    const { x, y, scale } = this.camera;
+    this.#glide = gliding ? { from: { x, y, scale }, to, began: performance.now() } : null;
+    if (!gliding) Object.assign(this.camera, to);
     this.refresh();
   }
 
@@ -100,6 +104,7 @@ export class MapView {
   follow(robot) {
     this.following = robot;
     this.#fits = false;
+    this.#glide = null;
     this.#follow();
     this.refresh();
   }
@@ -118,23 +123,34 @@ export class MapView {
     this.#asked = true;
     requestAnimationFrame((now) => {
       this.#asked = false;
+      this.#glideOn(now);
       this.#draw(now);
-      if (this.stage.isMoving) this.refresh();
+      if (this.stage.isMoving || this.#glide) this.refresh();
     });
   }
 
   /** Return where a robot is on the sheet, null where that is not known. */
-  robotPose(robot, cast = this.stage.actors) {
+  robotPose(robot, cast = this.stage.cast(performance.now())) {
     const name = this.#places[robot], last = this.#tracks.get(name)?.last;
-    const found = cast.findLast(({ scene }) => scene.robots.has(name));
+    const found = cast.filter(({ scene }) => scene.robots.has(name)).sort((a, b) => b.opacity - a.opacity)[0];
     return last && found ? compose(compose(found.pose, found.scene.robots.get(name)), last) : null;
   }
 
   #free(change) {
     this.#fits = false;
+    this.#glide = null;
     this.following = null;
     change();
     this.refresh();
+  }
+
+  #glideOn(now) {
+    if (this.#glide === null) return;
+    const { from, to, began } = this.#glide, t = Math.min(1, Math.max(0, (now - began) / MOVE)), share = t * t * (3 - 2 * t);
+    const mean = (a, b) => a + share * (b - a);
+    const scale = Math.exp(mean(Math.log(from.scale), Math.log(to.scale)));
+    Object.assign(this.camera, { x: mean(from.x, to.x), y: mean(from.y, to.y), scale });
+    if (t === 1) this.#glide = null;
   }
 
   #follow() {

@@ -2,6 +2,8 @@
 
 const SILENCE = 3500; // [ms] after which what is shown may be stale: a report comes every second
 
+const AGAIN = 3000; // [ms] after which a server that refused is asked again
+
 /** Return the JSON at `path`, null where there is none. */
 export async function fetchJson(path) {
   const answer = await fetch(path);
@@ -16,20 +18,26 @@ export async function fetchJson(path) {
  *                     false: whether the server is heard.
  */
 export function follow(on) {
-  const source = new EventSource("/events");
   let heard = Date.now();
   let contact = null;
   const tell = (now) => {
     if (now !== contact) on.contact((contact = now));
   };
-  for (const kind of ["version", "team", "story"]) {
-    source.addEventListener(kind, (event) => {
-      heard = Date.now();
-      tell(true);
-      on[kind](JSON.parse(event.data));
+  const open = () => {
+    const source = new EventSource("/events");
+    for (const kind of ["version", "team", "story"]) {
+      source.addEventListener(kind, (event) => {
+        heard = Date.now();
+        tell(true);
+        on[kind](JSON.parse(event.data));
+      });
+    }
+    source.addEventListener("error", () => {
+      tell(false);
+      if (source.readyState === EventSource.CLOSED) setTimeout(open, AGAIN); // it was refused
     });
-  }
-  source.addEventListener("error", () => tell(false));
+  };
+  open();
   setInterval(() => {
     if (Date.now() - heard > SILENCE) tell(false);
   }, 500);

@@ -4,7 +4,7 @@ import { arrange, boxOf } from "./layout.js";
 import { sceneOf, strongSupport } from "./scene.js";
 import { between, compose, inverse, same } from "./se2.js";
 
-const MOVE = 900; // [ms] from where components were to where they are
+export const MOVE = 900; // [ms] from where components were to where they are
 const FADE = 0.3; // share of it in which the new map takes the place of the old
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -26,7 +26,7 @@ export class Stage {
     const scenes = joint.components.map((component) => sceneOf(component, this.strong));
     const poses = arrange(scenes, this.#known, wide);
     const before = this.actors;
-    this.actors = scenes.map((scene, k) => ({ scene, pose: poses[k] }));
+    this.actors = inReadingOrder(scenes.map((scene, k) => ({ scene, pose: poses[k] })));
     const known = new Map(this.actors.flatMap(({ scene, pose }) =>
       scene.names.map((name) => [name, compose(pose, scene.robots.get(name))])));
     this.leaving = before.map((actor) => ({ ...actor, to: goalOf(actor, known) }));
@@ -65,6 +65,16 @@ export class Stage {
     const actor = this.actors.find(({ scene }) => scene.robots.has(name));
     return actor ? { actor, pose: compose(actor.pose, actor.scene.robots.get(name)) } : null;
   }
+}
+
+/** Return the components from the upper left to the lower right, as they are counted. */
+function inReadingOrder(actors) {
+  const boxes = new Map(actors.map((actor) => [actor, boxOf(actor.scene, actor.pose)]));
+  return [...actors].sort((a, b) => {
+    const [low, high] = boxes.get(a), [otherLow, otherHigh] = boxes.get(b);
+    const isBeside = low[1] < otherHigh[1] && otherLow[1] < high[1];
+    return isBeside ? low[0] - otherLow[0] : otherHigh[1] - high[1];
+  });
 }
 
 /** Return where a component of the version before goes: with the first of its robots that is left. */

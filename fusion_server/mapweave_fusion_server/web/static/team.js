@@ -7,7 +7,7 @@ import { colourOf } from "./palette.js";
 /** Fill `target` with a row a robot; `on.follow` takes the robot to be followed, or null. */
 export function fillTeam(target, report, following, on) {
   const now = report.coordinator.stamp;
-  const head = element("tr", {}, ...["Robot", "State", "Scans placed", "Sent", "Heard"].map((title, k) =>
+  const head = element("tr", {}, ...["Robot", "State", "Scans", "Sent", "Heard"].map((title, k) =>
     element("th", { scope: "col", class: k > 1 ? "number" : "" }, title)));
   const rows = report.robots.map((robot) => rowOf(robot, now, following === robot.robot, on));
   const focused = target.contains(document.activeElement) ? document.activeElement.dataset.robot : null;
@@ -41,7 +41,7 @@ function stateOf({ alive, runs, status, map_version: held }) {
     lines.push(element("small", {}, `${status.state}, ${counted(status.submaps, "submap")}${parts}`));
     const behind = held === null ? 0 : status.map_version - held;
     if (behind > 0) lines.push(element("small", {}, `${behind} behind here`));
-    if (status.compared.length) lines.push(element("small", {}, `compares with ${status.compared.join(", ")}`));
+    if (status.compared.length) lines.push(element("small", {}, `compares ${status.compared.join(", ")}`));
   }
   return lines;
 }
@@ -50,7 +50,7 @@ function scansOf(status) {
   if (!status) return ["–"];
   const { scans_placed: placed, scans_seen: seen, scans_total: total } = status;
   const bar = total ? element("progress", { max: total, value: seen, "aria-label": `scans seen of ${total}` }) : null;
-  return [`${placed}${total ? ` / ${total}` : ""}`, bar, placed < seen ? element("small", {}, `${seen - placed} not placed`) : null].filter(Boolean);
+  return [`${placed}${total ? `/${total}` : ""}`, bar, placed < seen ? element("small", {}, `${seen - placed} not placed`) : null].filter(Boolean);
 }
 
 const sentBy = (status) => Object.values(status.sent).reduce((sum, { bytes }) => sum + bytes, 0);
