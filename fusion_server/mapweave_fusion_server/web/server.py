@@ -1,5 +1,6 @@
 """Serves the page from a thread of its own, so that the coordinator's work goes on."""
 
+import os
 import socket
 import threading
 from collections.abc import Awaitable, Callable, Iterator
@@ -142,7 +143,8 @@ def _listen(address: HttpAddress) -> socket.socket:
     try:
         return socket.create_server((address.host, address.port), family=family)
     except OSError as error:
-        raise ArgumentError("--http", f"{address.authority}: {error.strerror}") from error
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise ArgumentError("--http", f"{address.authority}: {why}") from error
 
 
 def _configuration(app: ASGIApp) -> uvicorn.Config:
