@@ -125,7 +125,7 @@ def served(folder: Path) -> Iterator[Page]:
 
 
 def make_joint(
-    version: int, lines: LineMap, reason: str = "40 m of wall in common", **robots: float
+    version: int, lines: LineMap, *, reason: str = "40 m of wall in common", **robots: float
 ) -> JointMap:
     """Return a version with one component of `lines`, each robot's at its x [m]."""
     places = {f"{name}/0": np.array([x, 0.0, 0.0]) for name, x in robots.items()}

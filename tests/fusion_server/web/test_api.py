@@ -82,7 +82,7 @@ def test_the_times_of_all_versions_are_listed(page: Page, lines: LineMap) -> Non
 
 
 def test_what_came_from_the_network_cannot_end_a_script(page: Page, lines: LineMap) -> None:
-    page.publish(make_joint(1, lines, HOSTILE, a=0.0, b=1.0))
+    page.publish(make_joint(1, lines, reason=HOSTILE, a=0.0, b=1.0))
     for path in ("/api/joint", "/api/alignments"):
         answer = page.ask(path)
         assert b"<" not in answer.body
@@ -92,7 +92,7 @@ def test_what_came_from_the_network_cannot_end_a_script(page: Page, lines: LineM
 
 def test_the_alignments_are_those_of_the_latest_version(page: Page, lines: LineMap) -> None:
     assert page.ask("/api/alignments").json == {"version": 0, "alignments": []}
-    page.publish(make_joint(1, lines, "why", a=0.0, b=1.0))
+    page.publish(make_joint(1, lines, reason="why", a=0.0, b=1.0))
     content = page.ask("/api/alignments").json
     assert content["version"] == 1
     assert [(a["reference"], a["other"], a["reason"]) for a in content["alignments"]] == [
