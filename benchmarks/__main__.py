@@ -14,6 +14,7 @@ from benchmarks import (
     kidnap,
     mapping,
     mutations,
+    page,
     peers,
     reference,
     same_results,
@@ -48,6 +49,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,
+    "page": page,
     "mutations": mutations,
 }
 USUAL = ("figure2", "map", "kidnap", "fusion")
