@@ -23,7 +23,10 @@ const map = new MapView(byId("map"), {
   },
   key: (key) => press(key),
 });
-const evidence = new Evidence(byId("evidence"), () => decisions.choose(-1));
+const evidence = new Evidence(byId("evidence"), {
+  close: () => decisions.choose(-1),
+  turnOf: (name) => (map.stage.place(name)?.[2] ?? 0) + map.camera.turn,
+});
 const decisions = new Decisions(byId("decisions"), { show: showWhy, leave: () => evidence.leave() });
 const timeline = new Timeline({ show: load, compare });
 
