@@ -39,6 +39,7 @@ export class Evidence {
     if (!this.#cache.has(key)) this.#fill(alignment, [element("p", {}, "Laying the two maps on each other…")]);
     const found = await this.#fetched(key, joint.version, index, alignment);
     if (this.#asked === key) this.#fill(alignment, figuresOf(alignment, found));
+    if (this.#asked === key && pin) this.#target.scrollIntoView({ block: "nearest" });
   }
 
   /** Take it away, if it is not pinned. */
