@@ -26,7 +26,7 @@ def evidence_content(
 
     Returns
     -------
-    :
+    dict
         ``best`` and ``runner_up``, each with the transform and the places (n, 2) [m] on walls that
         are shared or contradicted, frame of `reference`.
     """

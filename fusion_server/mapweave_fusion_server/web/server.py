@@ -53,7 +53,7 @@ def live_page(
 
     Yields
     ------
-    :
+    HttpAddress
         The address with its port.
 
     Raises

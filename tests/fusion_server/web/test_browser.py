@@ -215,6 +215,22 @@ def test_a_decision_shows_what_speaks_for_it_and_against(
     expect(evidence).to_be_hidden()
 
 
+def test_what_has_the_focus_keeps_it_while_the_map_grows(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    """As does what is being clicked at that moment."""
+    page.publish(make_joint(1, lines, a=0.0, b=1.0))
+    page.feed.show_team((RobotReport("a", 1, None, 5.0, 1),), CoordinatorReport(stamp=5.0))
+    for focused in (".decision", "#team button", "#compare", "#downloads a"):
+        expect(seen.tab.locator(focused).first).to_be_visible()
+        seen.tab.locator(focused).first.focus()
+        page.publish(make_joint(page.store.latest_version + 1, lines, a=0.0, b=1.0, c=2.0))
+        page.feed.show_team((RobotReport("a", 1, None, 6.0, 1),), CoordinatorReport(stamp=9.0))
+        expect_version(seen.tab, page.store.latest_version)
+        expect(seen.tab.locator("#team")).to_contain_text("3 s ago")
+        assert seen.tab.evaluate("document.activeElement.matches('" + focused + "')"), focused
+
+
 def test_a_distance_is_measured_by_mouse_and_by_keys(
     page: Page, seen: Visit, lines: LineMap
 ) -> None:

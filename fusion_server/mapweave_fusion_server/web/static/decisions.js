@@ -1,6 +1,6 @@
 // The decisions of a version, the latest change first, each with its reason and its numbers.
 
-import { element } from "./dom.js";
+import { element, refill } from "./dom.js";
 import { degrees, metres, percent, robotOf } from "./format.js";
 import { colourOf } from "./palette.js";
 
@@ -42,6 +42,8 @@ export class Decisions {
   #on;
   #since = new Map();
   #timer = 0;
+  #joint = null;
+  #chosen = null;
 
   /** @param {object} on  `show` takes the alignment whose evidence is asked for, and its place. */
   constructor(list, on) {
@@ -52,46 +54,50 @@ export class Decisions {
   /** Show the decisions of `joint`; what changed since an earlier one that was shown goes first. */
   show(joint) {
     joint.alignments.forEach((alignment) => this.#remember(alignment, joint.version));
-    const order = joint.alignments.map((alignment, index) => ({ alignment, index, since: this.#changed(alignment) }));
+    const order = joint.alignments.map((alignment) => ({ alignment, since: this.#changed(alignment) }));
     order.sort((a, b) => b.since - a.since || kindOf(a.alignment).rank - kindOf(b.alignment).rank
       || a.alignment.confidence - b.alignment.confidence);
-    this.#list.replaceChildren(...order.map((entry) => this.#item(joint, entry)));
+    this.#joint = joint;
+    refill(this.#list, order.map(({ alignment }) => this.#item(alignment)));
   }
 
-  /** Mark the decision at `index` as the one whose evidence is shown. */
-  choose(index) {
-    for (const item of this.#list.children) {
-      item.classList.toggle("chosen", Number(item.dataset.index) === index);
-    }
+  /** Mark the decision whose evidence is shown; null marks none. */
+  choose(alignment) {
+    this.#chosen = alignment === null ? null : pairOf(alignment);
+    for (const item of this.#list.children) item.classList.toggle("chosen", item.dataset.pair === this.#chosen);
+  }
+
+  #show(pair, pin) {
+    this.#on.show(this.#joint, this.#joint.alignments.findIndex((alignment) => pairOf(alignment) === pair), pin);
   }
 
   #remember(alignment, version) {
     const pair = pairOf(alignment), label = kindOf(alignment).label;
     const before = this.#since.get(pair);
-    if (before === undefined) this.#since.set(pair, { label, version, first: this.#since.size });
-    else if (before.label !== label) this.#since.set(pair, { label, version, first: before.first });
+    if (before?.label !== label) this.#since.set(pair, { label, version });
   }
 
   #changed(alignment) {
     return this.#since.get(pairOf(alignment)).version;
   }
 
-  #item(joint, { alignment, index }) {
+  #item(alignment) {
+    const pair = pairOf(alignment);
     const sure = alignment.decision === "refused" ? null : element("span", { class: "sureness" }, percent(alignment.confidence));
-    const button = element("button", { class: "decision", type: "button", onclick: () => this.#on.show(joint, index, true) },
+    const button = element("button", { class: "decision", type: "button", onclick: () => this.#show(pair, true) },
       element("span", { class: "decision-head" }, chipOf(alignment), endsOf(alignment), sure),
       element("small", {}, alignment.reason),
       numbersOf(alignment, BEYOND));
     const rest = () => {
       clearTimeout(this.#timer);
-      this.#timer = setTimeout(() => this.#on.show(joint, index, false), WAIT);
+      this.#timer = setTimeout(() => this.#show(pair, false), WAIT);
     };
     button.addEventListener("pointerenter", (event) => event.pointerType === "mouse" && rest());
     button.addEventListener("pointerleave", () => {
       clearTimeout(this.#timer);
       this.#on.leave();
     });
-    return element("li", { "data-index": index }, button);
+    return element("li", { class: pair === this.#chosen ? "chosen" : "", "data-pair": pair }, button);
   }
 }
 

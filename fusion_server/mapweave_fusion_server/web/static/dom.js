@@ -27,6 +27,23 @@ function filled(made, attributes, children) {
 /** Return the element of the page called `id`. */
 export const byId = (id) => document.getElementById(id);
 
+/** Fill `parent` with `children`, but keep those there are that look the same: what has the focus,
+ *  or is being clicked just now, stays what it is.
+ */
+export function refill(parent, children) {
+  const before = [...parent.children];
+  const kept = children.map((child) => {
+    const place = before.findIndex((one) => one?.isEqualNode(child));
+    if (place < 0) return child;
+    before[place] = null;
+    return parent.children[place];
+  });
+  if (kept.length === parent.children.length && kept.every((child, k) => child === parent.children[k])) return;
+  const focused = document.activeElement;
+  parent.replaceChildren(...kept);
+  if (parent.contains(focused)) focused.focus();
+}
+
 /** Write `text` into `target`, if it is not there already: a screen reader says it once. */
 export function write(target, text) {
   if (target.textContent !== text) target.textContent = text;

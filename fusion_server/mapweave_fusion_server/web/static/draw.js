@@ -196,7 +196,8 @@ function write(context, u, v, text, align = "left") {
 
 /** Draw a bar of a round length at the lower right. */
 export function drawScaleBar(context, camera, grid) {
-  const length = niceLength(80 / camera.scale), width = length * camera.scale;
+  const isNarrow = camera.width < 600;
+  const length = niceLength((isNarrow ? 30 : 80) / camera.scale), width = length * camera.scale;
   const right = camera.width - 16, base = camera.height - 16;
   context.strokeStyle = theme().ink;
   context.lineWidth = 2;
@@ -207,7 +208,7 @@ export function drawScaleBar(context, camera, grid) {
   context.lineTo(right, base - 6);
   context.stroke();
   const text = length < 1 ? `${Math.round(100 * length)} cm` : `${length} m`;
-  write(context, right, base - 10, grid ? `grid ${grid} m  ·  ${text}` : text, "right");
+  write(context, right, base - 10, grid && !isNarrow ? `grid ${grid} m  ·  ${text}` : text, "right");
 }
 
 /** Draw what was measured: a line between points on the sheet, with its ends. */

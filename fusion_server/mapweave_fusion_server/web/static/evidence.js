@@ -18,12 +18,15 @@ export class Evidence {
   #target;
   #cache = new Map();
   #asked = null;
+  #on;
   pinned = false;
 
-  /** @param {HTMLElement} target  where it is shown */
-  constructor(target, onClose) {
+  /** @param {HTMLElement} target  where it is shown
+   *  @param {object} on  `close`; `turnOf` says how a component lies on the map [rad]
+   */
+  constructor(target, on) {
     this.#target = target;
-    this.onClose = onClose;
+    this.#on = on;
   }
 
   /** Show the evidence of alignment `index` of `joint`; one that is pinned stays when it is left. */
@@ -36,6 +39,7 @@ export class Evidence {
     if (!this.#cache.has(key)) this.#fill(alignment, [element("p", {}, "Laying the two maps on each other…")]);
     const found = await this.#fetched(key, joint.version, index, alignment);
     if (this.#asked === key) this.#fill(alignment, figuresOf(alignment, found));
+    if (this.#asked === key && pin) this.#target.scrollIntoView({ block: "nearest" });
   }
 
   /** Take it away, if it is not pinned. */
@@ -47,7 +51,7 @@ export class Evidence {
     this.pinned = false;
     this.#asked = null;
     this.#target.hidden = true;
-    this.onClose();
+    this.#on.close();
   }
 
   async #fetched(key, version, index, alignment) {
@@ -67,7 +71,7 @@ export class Evidence {
     this.#target.replaceChildren(
       element("div", { class: "evidence-head" }, chipOf(alignment), endsOf(alignment), element("strong", {}, sure), close),
       element("p", {}, alignment.reason), ...content);
-    this.#target.querySelectorAll("canvas").forEach((canvas) => canvas.paint());
+    this.#target.querySelectorAll("canvas").forEach((canvas) => canvas.paint(this.#on.turnOf(alignment.reference)));
   }
 }
 
@@ -87,14 +91,14 @@ function figuresOf(alignment, found) {
 
 function figure(title, match, numbers, reference, other) {
   const canvas = element("canvas", { role: "img", "aria-label": `${title}: ${reference.component} and ${other.component} laid on each other` });
-  canvas.paint = () => paint(canvas, match, reference, other);
+  canvas.paint = (turn) => paint(canvas, turn, match, reference, other);
   const told = `${metres(numbers.common ?? 0)} in common, ${metres(numbers.contradicted ?? 0)} contradicted`;
   return element("figure", {}, canvas, element("figcaption", {}, element("strong", {}, title), ` · ${told}`));
 }
 
-function paint(canvas, match, reference, other) {
+function paint(canvas, turn, match, reference, other) {
   const ratio = window.devicePixelRatio || 1, camera = new Camera();
-  Object.assign(camera, { width: canvas.clientWidth, height: canvas.clientHeight });
+  Object.assign(camera, { width: canvas.clientWidth, height: canvas.clientHeight, turn });
   canvas.width = Math.round(ratio * camera.width);
   canvas.height = Math.round(ratio * camera.height);
   Object.assign(camera, camera.fitting(cornersOf(match, reference, other), NO_MARGINS));

@@ -23,12 +23,15 @@ const map = new MapView(byId("map"), {
   },
   key: (key) => press(key),
 });
-const evidence = new Evidence(byId("evidence"), () => decisions.choose(-1));
+const evidence = new Evidence(byId("evidence"), {
+  close: () => decisions.choose(null),
+  turnOf: (name) => (map.stage.place(name)?.[2] ?? 0) + map.camera.turn,
+});
 const decisions = new Decisions(byId("decisions"), { show: showWhy, leave: () => evidence.leave() });
 const timeline = new Timeline({ show: load, compare });
 
 function showWhy(joint, index, pin) {
-  if (!evidence.pinned || pin) decisions.choose(index);
+  if (!evidence.pinned || pin) decisions.choose(joint.alignments[index]);
   return evidence.show(joint, index, pin);
 }
 

@@ -60,10 +60,9 @@ export class Stage {
     });
   }
 
-  /** Return where a robot's component lies on the sheet, and in which of the components shown. */
+  /** Return where a robot's component lies on the sheet, null if it is not there. */
   place(name) {
-    const actor = this.actors.find(({ scene }) => scene.robots.has(name));
-    return actor ? { actor, pose: compose(actor.pose, actor.scene.robots.get(name)) } : null;
+    return this.#known.get(name) ?? null;
   }
 }
 

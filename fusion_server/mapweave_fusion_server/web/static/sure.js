@@ -1,14 +1,15 @@
 // What is least sure: the joins that were not made, the weakest that was, the walls that are doubted.
 
 import { chipOf, endsOf, isReliedOn } from "./decisions.js";
-import { element } from "./dom.js";
+import { element, refill } from "./dom.js";
 import { counted, percent, robotOf } from "./format.js";
 import { DOUBTFUL } from "./scene.js";
 
 /** Fill `target` for the version `joint`; `show` takes the decision to be explained. */
 export function fillSure(target, joint, scenes, show) {
   const items = [notJoined(joint, scenes, show), weakest(joint, show), ...objected(joint), doubted(scenes)].filter(Boolean);
-  target.replaceChildren(items.length ? element("ul", { class: "sure" }, ...items) : element("p", {}, "Nothing yet."));
+  if (target.firstChild === null) target.append(element("ul", { class: "sure" }));
+  refill(target.firstChild, items.length ? items : [element("li", {}, "Nothing yet.")]);
 }
 
 /** Return who is not joined to whom, with the best that was found between them. */

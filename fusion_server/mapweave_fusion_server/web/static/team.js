@@ -1,6 +1,6 @@
 // The team in a table, and how the coordinator is.
 
-import { element, write } from "./dom.js";
+import { element, refill, write } from "./dom.js";
 import { amount, counted, duration } from "./format.js";
 import { colourOf } from "./palette.js";
 
@@ -10,11 +10,15 @@ export function fillTeam(target, report, following, on) {
   const head = element("tr", {}, ...["Robot", "State", "Scans", "Sent", "Heard"].map((title, k) =>
     element("th", { scope: "col", class: k > 1 ? "number" : "" }, title)));
   const rows = report.robots.map((robot) => rowOf(robot, now, following === robot.robot, on));
-  const focused = target.contains(document.activeElement) ? document.activeElement.dataset.robot : null;
-  target.replaceChildren(report.robots.length
-    ? element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows))
-    : element("p", {}, "No robot yet."));
-  if (focused) target.querySelector(`[data-robot="${CSS.escape(focused)}"]`)?.focus();
+  const names = report.robots.map(({ robot }) => robot).join(" ");
+  if (target.dataset.robots !== names) {
+    target.dataset.robots = names;
+    target.replaceChildren(rows.length
+      ? element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows))
+      : element("p", {}, "No robot yet."));
+  }
+  // Cell by cell: what is being clicked just now stays what it is.
+  target.querySelectorAll("tbody tr").forEach((row, k) => refill(row, [...rows[k].children]));
 }
 
 function rowOf(robot, now, followed, on) {
@@ -22,8 +26,8 @@ function rowOf(robot, now, followed, on) {
   const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
   swatch.style.background = colourOf(robot.robot);
   const follow = element("button", {
-    type: "button", "aria-pressed": String(followed), "aria-label": `Follow ${robot.robot}`, "data-robot": robot.robot,
-    onclick: () => on.follow(followed ? null : robot.robot),
+    type: "button", "aria-pressed": String(followed), "aria-label": `Follow ${robot.robot}`,
+    onclick: () => on.follow(followed ? null : robot.robot), // a cell of another state is another one
   }, "follow");
   return element("tr", {},
     element("th", { scope: "row" }, element("span", { class: "name" }, swatch, robot.robot), " ", follow),

@@ -1,7 +1,6 @@
 // All versions on a slider: going back, comparing two, taking one home.
 
-import { element, write } from "./dom.js";
-import { byId } from "./dom.js";
+import { byId, element, write } from "./dom.js";
 import { clock } from "./format.js";
 import { fetchJson } from "./source.js";
 
@@ -12,6 +11,8 @@ const OFFERED = 200; // versions to compare with
 export class Timeline {
   /** The version that is shown, 0 before there is any. */
   shown = 0;
+  /** The last version there is, 0 before there is any. */
+  latest = 0;
   isLatest = true;
   series = null;
   #times = new Map();
@@ -28,15 +29,12 @@ export class Timeline {
     byId("link").addEventListener("click", () => this.#copy());
   }
 
-  get latest() {
-    return this.#times.size ? Math.max(...[...this.#times.keys()].slice(-1)) : 0;
-  }
-
   /** Fetch which versions there are. */
   async load() {
     const { series, versions } = await fetchJson("/api/versions");
     this.series = series;
     this.#times = new Map(versions);
+    this.latest = versions.at(-1)?.[0] ?? 0;
     this.#write();
   }
 
@@ -44,6 +42,7 @@ export class Timeline {
   async add({ version, created, series }) {
     if (series !== this.series || version !== this.latest + 1) await this.load();
     this.#times.set(version, created);
+    this.latest = Math.max(this.latest, version);
     if (this.isLatest || this.shown > version) this.#show(version);
     this.#write();
   }
@@ -99,7 +98,7 @@ export class Timeline {
 
   #play() {
     if (this.#timer) return this.#stop();
-    if (this.shown === this.latest) this.go(Math.min(...this.#times.keys()));
+    if (this.shown === this.latest) this.go(1);
     this.#timer = setInterval(() => (this.shown < this.latest ? this.step(1) : this.#stop()), PLAY);
     byId("play").setAttribute("aria-pressed", "true");
     return undefined;
@@ -131,13 +130,22 @@ export class Timeline {
     history.replaceState(null, "", this.hash || location.pathname);
   }
 
+  #link() {
+    const links = byId("downloads");
+    if (this.shown && links.children.length === 0) links.append(...FILES.map((suffix) => element("a", {}, suffix.toUpperCase())));
+    [...links.children].forEach((link, k) => {
+      link.href = `/api/joint/${this.shown}.${FILES[k]}`;
+      link.download = `joint-${this.shown}.${FILES[k]}`;
+    });
+  }
+
   #offer() {
+    this.#link();
     const select = byId("compare"), chosen = select.value;
-    const numbers = [...this.#times.keys()].slice(-OFFERED).reverse();
+    if (select === document.activeElement && select.options.length > 1) return; // it may be open
+    const numbers = Array.from({ length: Math.min(OFFERED, this.latest) }, (_, k) => this.latest - k);
     const all = chosen && !numbers.includes(Number(chosen)) ? [Number(chosen), ...numbers] : numbers;
     select.replaceChildren(element("option", { value: "" }, "nothing"), ...all.map((number) => element("option", { value: number }, `version ${number}`)));
     select.value = chosen;
-    byId("downloads").replaceChildren(...(this.shown ? FILES : []).map((suffix) =>
-      element("a", { href: `/api/joint/${this.shown}.${suffix}`, download: `joint-${this.shown}.${suffix}` }, suffix.toUpperCase())));
   }
 }
