@@ -7,7 +7,7 @@ component.
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from mapweave.config import Config
 from mapweave.errors import ArgumentError, FinishedError
@@ -17,6 +17,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
 from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
+from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
@@ -49,34 +50,6 @@ class MapperParameters(StageParameters):
         description="scans in a row that fit nowhere, were not confirmed by the next one, or were"
         " blind, before the robot counts as lost",
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Placement:
-    """What became of a scan.
-
-    Attributes
-    ----------
-    placed
-        Whether it is in the map; one that waits may be placed by a later call.
-    component
-        The component the robot is in now.
-    submap_finished
-        Whether this call finished a submap.
-    lost
-        Whether this call started a new component.
-    pose
-        (3,) where the scan was taken [m, m, rad], component frame; None where it is not placed.
-    uncertainty
-        (4,) of it, as of `pose_uncertainty`, component frame; None as well.
-    """
-
-    placed: bool
-    component: int
-    submap_finished: bool
-    lost: bool
-    pose: FloatArray | None = None
-    uncertainty: FloatArray | None = None
 
 
 class Mapper:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.mapper import Placement
+from mapweave.mapping.placement import Placement
 from mapweave.maps import component_name
 from mapweave.scan.scan import Scan
 from mapweave_protocol.wire.messages import JointStatusMessage, PoseMessage

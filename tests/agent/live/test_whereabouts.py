@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapweave.geometry import se2
-from mapweave.mapping.mapper import Placement
+from mapweave.mapping.placement import Placement
 from mapweave.maps import JointComponent, JointMap, LineMap
 from mapweave.scan.scan import Scan
 from mapweave_agent.live.whereabouts import Whereabouts, covariance_of

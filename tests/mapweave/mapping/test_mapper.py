@@ -15,7 +15,8 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import write_map
 from mapweave.io.readers import read_reference_poses, read_scans
 from mapweave.mapping.backend import BackendResult, FinishedSubmap
-from mapweave.mapping.mapper import Mapper, Placement
+from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.placement import Placement
 from mapweave.maps import RobotMap, Submap, Trajectory
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import (
