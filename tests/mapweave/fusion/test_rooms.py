@@ -110,3 +110,9 @@ def test_a_corridor_is_no_room_of_common_shape() -> None:
     hall = prepare(part(BUILDING, 0, 30), P)
     assert hall is not None
     assert outside(hall.raster, hall.raster, se2.IDENTITY, P.verification, P.rooms) == math.inf
+
+
+def test_a_wall_that_is_drawn_once_counts_in_full_up_to_its_ends() -> None:
+    wall = prepare(line_map(np.array([[0.0, 0.0, 6.0, 0.0]])), P)
+    assert wall is not None
+    assert wall.raster.weight.sum() == pytest.approx(6.0)
