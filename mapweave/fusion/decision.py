@@ -57,7 +57,7 @@ class DecisionParameters(StageParameters):
         ge=0,
         description="[m] of score before the best different hypothesis, each metre counted once:"
         " on stretches of six recordings in 3 to 8 a limit of 4.5 m to 8 m joins no other pair"
-        " wrongly; at 6.5 m two more rightly than at 8 m",
+        " wrongly; at 6.5 m one more rightly than at 8 m",
     )
 
 

@@ -61,6 +61,8 @@ def outside(
         The two maps.
     transform
         (3,) from `other` to `reference` [m, m, rad].
+    verification, parameters
+        When walls coincide, and what a room is.
     """
     p, back = parameters, se2.inverse(transform)
     both = (
