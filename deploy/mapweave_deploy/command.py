@@ -154,8 +154,11 @@ def _unfinished_store(final: Path) -> Iterator[Path]:
 
 
 def _remove_store(path: Path) -> None:
-    """Remove what there is of a store, with the files SQLite keeps beside it."""
-    for end in ("", "-wal", "-shm"):
+    """Remove what there is of a store, with the files SQLite keeps beside it.
+
+    A coordinator that is ended while it makes its store leaves the journal of that.
+    """
+    for end in ("", "-wal", "-shm", "-journal"):
         path.with_name(path.name + end).unlink(missing_ok=True)
 
 

@@ -108,6 +108,8 @@ def test_a_killed_launcher_takes_all_processes_with_it(tmp_path: Path) -> None:
 
 
 def test_a_team_out_of_time_says_who_is_not_done(tmp_path: Path) -> None:
+    for end in ("", "-journal", "-wal", "-shm"):  # as an earlier one that was killed left them
+        (tmp_path / f"store-new.sqlite{end}").touch()
     command = [*PROGRAM, "team", "--world", "arena", "--robots", "2", "--rate", "1"]
     told = subprocess.run(
         [*command, "--timeout", "1", "--output", str(tmp_path)],
