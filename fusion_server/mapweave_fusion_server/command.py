@@ -5,7 +5,7 @@ import logging
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from mapweave.cli import Command, add_config_argument, argument, config_of, not_negative
@@ -71,6 +71,7 @@ def _run(options: argparse.Namespace) -> int:
         Store(path, team) as store,
         _page(options.http, team, store, config) as feed,
         open_session(endpoints, on_wait=tell_waiting) as session,
+        nullcontext() if feed is None else feed.positions.heard_on(session, team),
     ):
         Service(session, team, store, parameters, config, feed).run(stop_on_signal())
     return 0
