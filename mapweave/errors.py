@@ -25,13 +25,18 @@ class FileError(MapweaveError):
         self.problem = problem
 
 
+def _quoted(name: object) -> str:
+    """Return `name`, which may be of anybody and of any length, in quotation marks."""
+    return repr(name[:64] + "…" if isinstance(name, str) and len(name) > 64 else name)
+
+
 class InvalidIdError(MapweaveError):
     """A robot or team name that is not ``[a-z0-9][a-z0-9_-]{0,31}``."""
 
     def __init__(self, kind: str, name: str) -> None:
         super().__init__(
-            f"{kind} {name!r}: expected 1 to 32 characters, lower-case letters, digits, '_' or '-',"
-            " the first a letter or digit"
+            f"{kind} {_quoted(name)}: expected 1 to 32 characters, lower-case letters, digits, '_'"
+            " or '-', the first a letter or digit"
         )
         self.kind = kind
         self.name = name
@@ -41,7 +46,9 @@ class InvalidComponentError(MapweaveError):
     """A name that is not of a robot's component."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(f"component {name!r}: expected a robot's id and a number, such as 'a/0'")
+        super().__init__(
+            f"component {_quoted(name)}: expected a robot's id and a number, such as 'a/0'"
+        )
         self.name = name
 
 

@@ -119,5 +119,16 @@ def _tell_witnesses(by: Sequence[Pair]) -> str:
     return " and ".join(by[0]) if by else "two of the maps"
 
 
+def shown(text: str, limit: int = 120) -> str:
+    """Return what somebody else wrote for a terminal or a log: on one line, and no longer.
+
+    Whatever moves a cursor, begins a line or turns the direction of writing is written as its
+    code.
+    """
+    cut = text[:limit]
+    safe = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in cut)
+    return safe if len(safe) <= limit and len(cut) == len(text) else f"{safe[: limit - 1]}…"
+
+
 def _shortened(sentence: str) -> str:
     return sentence if len(sentence) <= MAX_LENGTH else f"{sentence[: MAX_LENGTH - 1]}…"

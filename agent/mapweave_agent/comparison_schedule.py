@@ -9,6 +9,8 @@ from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_protocol.wire.messages import AlignmentMessage, Compared, MapVersion
 from mapweave_protocol.wire.pairs import is_earlier_run, ordered, responsible
 
+MAX_BOOTS = 64  # of a peer: tokens cost those who hold them nothing
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -97,6 +99,24 @@ class ComparisonSchedule:
         earlier = self._peer(robot_map.robot)
         earlier.newest, earlier.last = robot_map, (robot_map.boot, robot_map.version)
 
+    def knows(self, robot: str) -> bool:
+        """Tell whether a map of a peer is here."""
+        return robot in self._peers and self._peers[robot].newest is not None
+
+    def version_of(self, robot: str, boot: str) -> int | None:
+        """Return which version of the map of a run is here, None if none is."""
+        newest = self._peers[robot].newest if robot in self._peers else None
+        return newest.version if newest is not None and newest.boot == boot else None
+
+    def drop_map(self, robot: str) -> None:
+        """Drop the map of a peer: it was not from it."""
+        peer = self._peer(robot)
+        peer.newest = peer.compared = None
+
+    def forget(self, robot: str) -> None:
+        """Forget a peer."""
+        self._peers.pop(robot, None)
+
     def peer_finished(self, robot: str, boot: str, version: int) -> None:
         """Note that the map of that version is a peer's last."""
         self._peer(robot).last = boot, version
@@ -104,7 +124,8 @@ class ComparisonSchedule:
     def peer_here(self, robot: str, boot: str) -> None:
         """Note that a run of a peer is alive."""
         peer = self._peer(robot)
-        peer.boots.add(boot)
+        if len(peer.boots) < MAX_BOOTS:
+            peer.boots.add(boot)
         peer.gone = False
 
     def peer_gone(self, robot: str, boot: str) -> None:

@@ -1,6 +1,7 @@
 """What a robot hears of its team, handed on to its plan of comparisons."""
 
 import logging
+import time
 
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.live.whereabouts import Whereabouts
@@ -17,6 +18,13 @@ from mapweave_protocol.link.inbox import (
     read_presence,
     status_reader,
 )
+from mapweave_protocol.link.lacking import Lacking
+from mapweave_protocol.link.refusals import Refusals
+from mapweave_protocol.link.strangers import Strangers
+from mapweave_protocol.wire.messages import StatusMessage
+
+MAX_PEERS = 64  # with a map here
+FAR = 1_000_000  # versions from one message to the next: eleven days of one a second
 
 _log = logging.getLogger(__name__)
 
@@ -48,10 +56,13 @@ class Dispatcher:
         self._plan = plan
         self._needs = needs
         self._whereabouts = whereabouts
-        self._maps = map_reader()
-        self._statuses = status_reader()
-        self._alignments = alignment_reader()
-        self._joint_statuses = joint_status_reader()
+        self.refusals = Refusals()
+        self._maps = map_reader(self.refusals)
+        self._statuses = status_reader(self.refusals)
+        self._alignments = alignment_reader(self.refusals)
+        self._joint_statuses = joint_status_reader(self.refusals)
+        self._strangers = Strangers(self._forget)
+        self._lacking = Lacking()
         self._coordinators = Claimants()
         self._namesakes = Claimants()
         self._namesakes.take(boot, here=True)
@@ -60,12 +71,12 @@ class Dispatcher:
     @property
     def refused(self) -> int:
         """How many messages were not what they should be."""
-        readers = self._maps, self._statuses, self._alignments, self._joint_statuses
-        return sum(reader.refused for reader in readers)
+        return self.refusals.total
 
     def take(self, arrival: Arrival) -> None:
         """Take in what arrived."""
-        presence, coordinator = read_presence(arrival), read_coordinator(arrival)
+        presence = read_presence(arrival, self.refusals)
+        coordinator = read_coordinator(arrival, self.refusals)
         if presence is not None:
             self._take_presence(presence)
         elif coordinator is not None:
@@ -84,7 +95,9 @@ class Dispatcher:
             count = self._namesakes.take(presence.boot, here=presence.here)
             if count:
                 _log.warning(tell_robots(self._robot, count))
-        elif presence.here:
+            return
+        self._note(presence.robot)
+        if presence.here:
             self._plan.peer_here(presence.robot, presence.boot)
         else:
             self._plan.peer_gone(presence.robot, presence.boot)
@@ -102,7 +115,15 @@ class Dispatcher:
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)
-        if message is not None and message.robot != self._robot:
+        if message is None or message.robot == self._robot:
+            return
+        self._note(message.robot)
+        held = self._plan.version_of(message.robot, message.boot)
+        if message.version > (held or 0) + FAR:
+            self._maps.refuse(arrival.key, f"version {message.version}, far beyond the one here")
+        elif len(self._plan.held) >= MAX_PEERS and not self._plan.knows(message.robot):
+            self._maps.refuse(arrival.key, "there are too many robots already")
+        else:
             robot_map = self._assembler.update(message)
             if robot_map is not None:
                 self._plan.peer_map(robot_map)
@@ -111,11 +132,35 @@ class Dispatcher:
         status = self._statuses.read(arrival)
         if status is None or status.robot == self._robot:
             return
+        self._note(status.robot)
         self._needs.peer(status)
+        self._check_map_of(status)
         if status.state == "finished":
             self._plan.peer_finished(status.robot, status.boot, status.map_version)
+
+    def _check_map_of(self, status: StatusMessage) -> None:
+        """Drop a peer's map of a version that the peer has not come to: it is not from it.
+
+        The peer sees in our status that it is lacking, and sends it again.
+        """
+        robot, boot = status.robot, status.boot
+        held = self._plan.version_of(robot, boot)
+        false = held is not None and held > status.map_version
+        if self._lacking.due(f"{robot} {boot}", held, time.monotonic(), lacks=false):
+            _log.warning("the map of %s here is not from it: dropped", robot)
+            self._assembler.forget(robot, boot)
+            self._plan.drop_map(robot)
+
+    def _note(self, robot: str) -> None:
+        self._strangers.heard(robot, has_map=self._plan.knows(robot))
+
+    def _forget(self, robot: str) -> None:
+        """Forget what is known of a robot that never came with a map."""
+        self._plan.forget(robot)
+        self._assembler.forget(robot)
 
     def _take_alignment(self, arrival: Arrival) -> None:
         message = self._alignments.read(arrival)
         if message is not None and message.robot != self._robot:
+            self._note(message.robot)
             self._plan.learned(message)

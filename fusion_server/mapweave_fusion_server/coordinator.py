@@ -102,7 +102,7 @@ class Coordinator:
         self._version = number if number is not None else last.version if last else 0
         self._judged = last.alignments if last else ()
         self._is_last_known = last is not None
-        self._names: set[str] = set()
+        self._doubted: set[Run] = set()
         self._maps: dict[Run, RobotMap] = {}
         self._states: dict[Run, dict[int, dict[int, SubmapPlace]]] = {}
         self._alignments: dict[frozenset[Run], AlignmentMessage] = {}
@@ -156,11 +156,16 @@ class Coordinator:
         return any(not set(new.components).isdisjoint(m.components) for m in others)
 
     def admits(self, robots: Set[str]) -> bool:
-        """Return whether these robots are listened to; from the first time they are."""
-        if len(self._names | robots) > self._parameters.max_robots:
-            return False
-        self._names |= robots
-        return True
+        """Return whether there is room for these robots; those count that have a map here."""
+        return len({robot for robot, _ in self._maps} | robots) <= self._parameters.max_robots
+
+    def has_maps_of(self, message: AlignmentMessage) -> bool:
+        """Tell whether the maps that `message` is about have been here."""
+        return all((self.version_of(e.robot, e.boot) or -1) >= e.version for e in _ends(message))
+
+    def doubt(self, robot: str, boot: str) -> None:
+        """Take the next map of a run whatever its version: the one here is not the robot's."""
+        self._doubted.add((robot, boot))
 
     def receive_map(self, new: RobotMap) -> bool:
         """Take a robot's map; return whether it is news.
@@ -172,7 +177,9 @@ class Coordinator:
         if not new.submaps or not self.admits({new.robot}) or self.clashes(new):
             return False
         known = self._maps.get(_run(new))
-        if known is not None and known.version >= new.version:
+        if _run(new) in self._doubted:
+            self._replace_doubted(new)
+        elif known is not None and known.version >= new.version:
             return False
         if known is None and len(self._runs_of(new.robot)) >= MAX_RUNS:
             return False
@@ -198,6 +205,15 @@ class Coordinator:
         joined_or_parted = _accepted_links(new) != _accepted_links(known)
         self._raise_urgency(Urgency.NOW if joined_or_parted else Urgency.SOON)
         return True
+
+    def _replace_doubted(self, new: RobotMap) -> None:
+        """Forget what was said of states of a run that it never was in."""
+        run = _run(new)
+        self._doubted.discard(run)
+        self._states.pop(run, None)
+        for runs, message in list(self._alignments.items()):
+            if states_of(_ends(message)).get(run, 0) > new.version:
+                del self._alignments[runs]
 
     def forget_news(self) -> None:
         """Take what was received so far as part of the last version: after a restart."""

@@ -6,12 +6,11 @@ and dropped. Knows no clock.
 
 import logging
 from collections import defaultdict
-from collections.abc import Set
 from typing import TypeVar
 
-from mapweave.errors import InvalidIdError
 from mapweave.maps import JointMap, RobotMap
-from mapweave_fusion_server.coordinator import Coordinator, pair_of
+from mapweave_fusion_server.coordinator import Coordinator
+from mapweave_fusion_server.early import EarlyAlignment, EarlyAlignments
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import RobotReport
@@ -22,12 +21,14 @@ from mapweave_protocol.link.inbox import (
     alignment_reader,
     map_reader,
     read_coordinator,
+    read_presence,
     status_reader,
 )
 from mapweave_protocol.link.lacking import Lacking
+from mapweave_protocol.link.refusals import Refusals
+from mapweave_protocol.link.strangers import Strangers
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.keys import LIVE
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
@@ -36,6 +37,8 @@ from mapweave_protocol.wire.messages import (
 )
 from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.pairs import Run
+
+FAR = 1_000_000  # versions from one message to the next: eleven days of one a second
 
 M = TypeVar("M", bound=Message)
 _log = logging.getLogger(__name__)
@@ -72,9 +75,12 @@ class Intake:
         self._coordinator = coordinator
         self._store = store
         self._story = story
-        self._maps = map_reader()
-        self._alignments = alignment_reader()
-        self._statuses = status_reader()
+        self.refusals = Refusals()
+        self._maps = map_reader(self.refusals)
+        self._alignments = alignment_reader(self.refusals)
+        self._statuses = status_reader(self.refusals)
+        self._strangers = Strangers(self._forget)
+        self._early = EarlyAlignments()
         self._heard: dict[Run, StatusMessage] = {}
         self._last_heard: dict[str, float] = {}
         self._lacking = Lacking()
@@ -82,12 +88,11 @@ class Intake:
         self._packers: defaultdict[Run, MapSender] = defaultdict(MapSender)
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
-        self._warned_of_too_many = False
 
     @property
     def refused(self) -> int:
         """How many messages were dropped because they were not what they should be."""
-        return self._maps.refused + self._alignments.refused + self._statuses.refused
+        return self.refusals.total
 
     @property
     def reports(self) -> tuple[RobotReport, ...]:
@@ -121,23 +126,26 @@ class Intake:
         """Take what arrived at `received` [s since 1970]."""
         if self._maps.reads(arrival):
             map_message = self._maps.read(arrival)
-            if map_message is not None and self._hears({map_message.robot}):
+            if map_message is not None and self._has_room_for(map_message, arrival.key):
                 self._take_map(map_message, received)
         elif self._alignments.reads(arrival):
             message = self._alignments.read(arrival)
-            if message is not None and self._hears(pair_of(message)):
-                self._take_alignments(message, arrival.payload, received)
+            if message is not None:
+                self._take_alignments(EarlyAlignment(message, arrival.payload, received))
         elif self._statuses.reads(arrival):
             status = self._statuses.read(arrival)
-            if status is not None and self._hears({status.robot}):
+            if status is not None:
+                self._note(status.robot)
                 self._heard[status.robot, status.boot] = status
                 self._last_heard[status.robot] = received
                 record(self._story.status(status))
-        elif (coordinator := read_coordinator(arrival)) is not None:
+        elif (coordinator := read_coordinator(arrival, self.refusals)) is not None:
             boot, here = coordinator
             record(self._story.coordinator(boot, here=here))
-        elif LIVE.matches(arrival.key):
-            self._take_presence(arrival)
+        elif (presence := read_presence(arrival, self.refusals)) is not None:
+            self._note(presence.robot)
+            change = self._story.appeared if presence.here else self._story.left
+            record(change(presence.robot, presence.boot))
 
     def _held_version(self, robot: str) -> int | None:
         held = self._coordinator.map_of(robot)
@@ -149,9 +157,19 @@ class Intake:
         return [robot for (robot, _), status in heard.items() if self._lacks_map(status, now)]
 
     def _lacks_map(self, status: StatusMessage, now: float) -> bool:
-        held = self._coordinator.version_of(status.robot, status.boot)
-        lacks = status.submaps > 0 and (held is None or held < status.map_version)
-        return self._lacking.due(f"{status.robot} {status.boot}", held, now, lacks=lacks)
+        """Tell whether to ask a robot for its map; also where the one here is not from it."""
+        robot, boot = status.robot, status.boot
+        held = self._coordinator.version_of(robot, boot)
+        lacks = status.submaps > 0 and (held is None or held != status.map_version)
+        due = self._lacking.due(f"{robot} {boot}", held, now, lacks=lacks)
+        if due and held is not None and held > status.map_version:
+            _log.warning(
+                "the map of %s here is of version %d, and it has come to %d: asked for it",
+                robot, held, status.map_version,
+            )  # fmt: skip
+            self._coordinator.doubt(robot, boot)
+            self._assembler.forget(robot, boot)
+        return due
 
     def _take_map(self, message: MapMessage, received: float) -> None:
         new = self._assembler.update(message)
@@ -163,6 +181,8 @@ class Intake:
             last = max(new.components)
             self._store.keep_map((new.robot, new.boot), last, received, complete)
             record(self._story.mapped(new))
+            for found in self._early.take(new.robot, new.boot):
+                self._take_alignments(found)
         elif self._coordinator.clashes(new) and new.boot not in self._clashing:
             self._clashing.add(new.boot)
             _log.warning(
@@ -181,24 +201,33 @@ class Intake:
                 _log.warning("map of %s ignored, %s", robot_map.robot, error)
             return None
 
-    def _take_alignments(self, new: AlignmentMessage, payload: bytes, received: float) -> None:
-        if self._coordinator.receive_alignments(new):
+    def _take_alignments(self, found: EarlyAlignment) -> None:
+        """Take what was found about maps that are here; what is about others waits for them."""
+        new = found.message
+        if not self._coordinator.has_maps_of(new):
+            self._early.keep(found)
+        elif self._coordinator.receive_alignments(new):
             reference, other = (f"{end.robot}@{end.boot}" for end in (new.reference, new.other))
-            self._store.add_alignments((reference, other), received, payload)
+            self._store.add_alignments((reference, other), found.received, found.payload)
             record(self._story.aligned(new))
 
-    def _take_presence(self, arrival: Arrival) -> None:
-        try:
-            run = LIVE.parse(arrival.key)
-        except InvalidIdError:
-            return  # not one of ours, and nothing depends on it
-        del run["team"]
-        if self._hears({run["robot"]}):
-            record(self._story.left(**run) if arrival.gone else self._story.appeared(**run))
+    def _note(self, robot: str) -> None:
+        self._strangers.heard(robot, has_map=self._held_version(robot) is not None)
 
-    def _hears(self, robots: Set[str]) -> bool:
-        heard = self._coordinator.admits(robots)
-        if not heard and not self._warned_of_too_many:
-            self._warned_of_too_many = True
-            _log.warning("%s ignored: there are too many robots already", ", ".join(sorted(robots)))
-        return heard
+    def _forget(self, robot: str) -> None:
+        """Forget what is known of a robot that never came with a map."""
+        self._story.robots.pop(robot, None)
+        self._last_heard.pop(robot, None)
+        self._assembler.forget(robot)
+
+    def _has_room_for(self, message: MapMessage, key: str) -> bool:
+        """Tell whether a map is taken: of no robot too many, and of no version out of reach."""
+        self._note(message.robot)
+        held = self._coordinator.version_of(message.robot, message.boot)
+        if message.version > (held or 0) + FAR:
+            self._maps.refuse(key, f"version {message.version}, far beyond the {held or 0} here")
+            return False
+        if not self._coordinator.admits({message.robot}):
+            self._maps.refuse(key, "there are too many robots already")
+            return False
+        return True

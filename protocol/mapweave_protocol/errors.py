@@ -24,7 +24,7 @@ class ForeignKeyError(MapweaveError):
     """A key that is not one of ours."""
 
     def __init__(self, key: str, expected: str) -> None:
-        super().__init__(f"key {key!r}: expected {expected}")
+        super().__init__(f"key {key[:120]!r}: expected {expected}")
         self.key = key
         self.expected = expected
 

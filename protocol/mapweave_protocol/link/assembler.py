@@ -148,6 +148,13 @@ class MapAssembler:
         runs = self._runs.get(robot, {}).values()
         return any(r.newest is not None and r.newest.version > r.delivered for r in runs)
 
+    def forget(self, robot: str, boot: str | None = None) -> None:
+        """Forget what is held of a robot, or of one run of it."""
+        if boot is None:
+            self._runs.pop(robot, None)
+        else:
+            self._runs.get(robot, {}).pop(boot, None)
+
     def _run(self, message: MapMessage) -> _Run:
         """Return what is held of the run of `message`; of too many, the longest unheard goes."""
         runs = self._runs.setdefault(message.robot, {})

@@ -14,6 +14,9 @@ def tell_robots(robot: str, count: int) -> str:
     return f"{count} agents call themselves {robot}: expected one; give each robot an id of its own"
 
 
+MOST = 64  # of one name: tokens cost those who hold them nothing
+
+
 class Claimants:
     """Those that claim one name, such as a robot's id, or to be a team's coordinator."""
 
@@ -25,6 +28,8 @@ class Claimants:
         known = boot in self.boots
         if not here:
             self.boots.discard(boot)
+            return 0
+        if not known and len(self.boots) >= MOST:
             return 0
         self.boots.add(boot)
         return 0 if known or len(self.boots) == 1 else len(self.boots)

@@ -1,8 +1,7 @@
 """What arrives, from several subscriptions in one order, read and checked."""
 
-import logging
 import threading
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -11,7 +10,8 @@ import zenoh
 
 from mapweave.errors import MapweaveError
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.link.refusals import Refusals
+from mapweave_protocol.wire.codec import MAX_PAYLOAD, decode
 from mapweave_protocol.wire.keys import (
     ALIGNMENT,
     COORDINATOR_LIVE,
@@ -22,6 +22,7 @@ from mapweave_protocol.wire.keys import (
     POSE,
     STATUS,
     KeyFormat,
+    sender_of,
 )
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
@@ -34,10 +35,10 @@ from mapweave_protocol.wire.messages import (
 from mapweave_protocol.wire.model import Message
 
 CAPACITY = 4096
-MAX_WARNED = 256
+ROOM = 32 * 2**20  # [bytes]
 
 M = TypeVar("M", bound=Message)
-_log = logging.getLogger(__name__)
+TOKEN = "token"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,56 +59,122 @@ class Arrival:
     payload: bytes
     gone: bool = False
 
+    @property
+    def size(self) -> int:
+        """How many bytes it takes."""
+        return len(self.key) + len(self.payload)
+
 
 class Inbox:
-    """A queue between Zenoh's threads and ours; when it is full, the oldest is dropped."""
+    """A queue between Zenoh's threads and ours, in which no sender delays another.
 
-    def __init__(self, capacity: int = CAPACITY) -> None:
-        self._arrivals: deque[Arrival] = deque(maxlen=capacity)
+    Each sender has a queue of its own, and they take turns. When it is full, the oldest of the
+    sender that has most in it is dropped.
+
+    Parameters
+    ----------
+    capacity
+        How many arrivals it holds.
+    room
+        How many bytes; one arrival always fits.
+    """
+
+    def __init__(self, capacity: int = CAPACITY, room: int = ROOM) -> None:
+        self._capacity = capacity
+        self._room = room
+        self._queues: OrderedDict[str, deque[Arrival]] = OrderedDict()
+        self._count = self._bytes = 0
         self._changed = threading.Condition()
+        self.dropped = 0
 
     def put(self, sample: zenoh.Sample) -> None:
         """Take in `sample`; made to be a subscriber's callback."""
         gone = sample.kind == zenoh.SampleKind.DELETE
-        arrival = Arrival(str(sample.key_expr), sample.payload.to_bytes(), gone)
+        too_large = len(sample.payload) > MAX_PAYLOAD
+        # Empty, it is refused as what it is not; its bytes are nobody's to keep.
+        payload = b"" if too_large else sample.payload.to_bytes()
+        self.add(Arrival(str(sample.key_expr), payload, gone))
+
+    def add(self, arrival: Arrival) -> None:
+        """Take in `arrival`."""
         with self._changed:
-            self._arrivals.append(arrival)
+            self._queues.setdefault(sender_of(arrival.key), deque()).append(arrival)
+            self._count += 1
+            self._bytes += arrival.size
+            while self._count > 1 and (self._count > self._capacity or self._bytes > self._room):
+                self._drop()
             self._changed.notify()
 
     def get(self, timeout: float) -> Arrival | None:
         """Return the next arrival, None if there is none within `timeout` [s]."""
         with self._changed:
-            self._changed.wait_for(lambda: self._arrivals, timeout)
-            return self._arrivals.popleft() if self._arrivals else None
+            self._changed.wait_for(lambda: self._queues, timeout)
+            if not self._queues:
+                return None
+            sender, queue = next(iter(self._queues.items()))
+            arrival = self._take(sender, queue)
+            if queue:
+                self._queues.move_to_end(sender)
+            return arrival
 
     def newest(self, timeout: float) -> Arrival | None:
         """As `get`, of several arrivals at the key that is next the last one only."""
+        arrival = self.get(timeout)
+        if arrival is None:
+            return None
         with self._changed:
-            self._changed.wait_for(lambda: self._arrivals, timeout)
-            if not self._arrivals:
-                return None
-            key = self._arrivals[0].key
-            same = [arrival for arrival in self._arrivals if arrival.key == key]
-            others = [arrival for arrival in self._arrivals if arrival.key != key]
-            self._arrivals.clear()
-            self._arrivals.extend(others)
-            return same[-1]
+            queue = self._queues.get(sender_of(arrival.key), deque())
+            same = [one for one in queue if one.key == arrival.key]
+            for one in same:
+                queue.remove(one)
+                self._forget(one)
+            if not queue:
+                self._queues.pop(sender_of(arrival.key), None)
+        return same[-1] if same else arrival
+
+    def _drop(self) -> None:
+        by_bytes = self._bytes > self._room
+        sender, queue = max(
+            self._queues.items(),
+            key=lambda item: sum(a.size for a in item[1]) if by_bytes else len(item[1]),
+        )
+        self._take(sender, queue)
+        self.dropped += 1
+
+    def _take(self, sender: str, queue: "deque[Arrival]") -> Arrival:
+        arrival = queue.popleft()
+        self._forget(arrival)
+        if not queue:
+            del self._queues[sender]
+        return arrival
+
+    def _forget(self, arrival: Arrival) -> None:
+        self._count -= 1
+        self._bytes -= arrival.size
 
 
 class Reader(Generic[M]):
     """Reads the messages of one kind; refuses what is not valid, or from another than it says.
 
-    Attributes
+    Parameters
     ----------
-    refused
-        How many arrivals were refused. Of each key the first one is logged.
+    kind
+        Of message.
+    keys
+        Where they come.
+    refusals
+        Where those are counted that are refused; of its own unless told.
     """
 
-    def __init__(self, kind: type[M], keys: KeyFormat) -> None:
-        self.refused = 0
+    def __init__(self, kind: type[M], keys: KeyFormat, refusals: Refusals | None = None) -> None:
         self._kind = kind
         self._keys = keys
-        self._warned: set[str] = set()
+        self._refusals = refusals or Refusals()
+
+    @property
+    def refused(self) -> int:
+        """How many arrivals were refused, by all who count there."""
+        return self._refusals.total
 
     def reads(self, arrival: Arrival) -> bool:
         """Tell whether `arrival` came in at one of this reader's keys."""
@@ -120,15 +187,13 @@ class Reader(Generic[M]):
             message = decode(self._kind, arrival.payload)
             check_origin(message, parts)
         except MapweaveError as error:
-            self._refuse(arrival.key, error)
+            self.refuse(arrival.key, error)
             return None
         return message
 
-    def _refuse(self, key: str, error: MapweaveError) -> None:
-        self.refused += 1
-        if key not in self._warned and len(self._warned) < MAX_WARNED:
-            self._warned.add(key)
-            _log.warning("%s: ignored, %s", key, error)
+    def refuse(self, key: str, why: object) -> None:
+        """Count a message under `key` as refused, for whatever reason."""
+        self._refusals.add(sender_of(key), self._kind.format, key, why)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,26 +205,26 @@ class Presence:
     here: bool
 
 
-def read_presence(arrival: Arrival) -> Presence | None:
+def read_presence(arrival: Arrival, refusals: Refusals | None = None) -> Presence | None:
     """Return what a liveliness token says, None if `arrival` is none of a robot's."""
     if not LIVE.matches(arrival.key):
         return None
     try:
         parts = LIVE.parse(arrival.key)
     except MapweaveError as error:
-        _log.warning("%s: ignored, %s", arrival.key, error)
+        (refusals or Refusals()).add(sender_of(arrival.key), TOKEN, arrival.key, error)
         return None
     return Presence(parts["robot"], parts["boot"], here=not arrival.gone)
 
 
-def read_coordinator(arrival: Arrival) -> tuple[str, bool] | None:
+def read_coordinator(arrival: Arrival, refusals: Refusals | None = None) -> tuple[str, bool] | None:
     """Return the boot of a coordinator and whether it is here, None if `arrival` is no token."""
     if not COORDINATOR_LIVE.matches(arrival.key):
         return None
     try:
         boot = COORDINATOR_LIVE.parse(arrival.key)["boot"]
     except MapweaveError as error:
-        _log.warning("%s: ignored, %s", arrival.key, error)
+        (refusals or Refusals()).add(sender_of(arrival.key), TOKEN, arrival.key, error)
         return None
     return boot, not arrival.gone
 
@@ -175,11 +240,14 @@ def check_origin(message: Message, parts: Mapping[str, str]) -> None:
     Raises
     ------
     MessageError
-        If a robot's id differs.
+        If a robot's id differs, or somebody speaks of two others.
     """
     said = message.model_dump(include={"robot"})
     if isinstance(message, AlignmentMessage):
-        said |= {"reference": message.reference.robot, "other": message.other.robot}
+        pair = {"reference": message.reference.robot, "other": message.other.robot}
+        if message.robot not in pair.values():
+            raise MessageError(message.format, f"of two others, by {message.robot!r}")
+        said |= pair
     for name, robot in said.items():
         if parts.get(name) != robot:
             raise MessageError(
@@ -187,31 +255,31 @@ def check_origin(message: Message, parts: Mapping[str, str]) -> None:
             )
 
 
-def map_reader() -> Reader[MapMessage]:
+def map_reader(refusals: Refusals | None = None) -> Reader[MapMessage]:
     """Return a reader of robot maps."""
-    return Reader(MapMessage, MAP)
+    return Reader(MapMessage, MAP, refusals)
 
 
-def pose_reader() -> Reader[PoseMessage]:
+def pose_reader(refusals: Refusals | None = None) -> Reader[PoseMessage]:
     """Return a reader of poses."""
-    return Reader(PoseMessage, POSE)
+    return Reader(PoseMessage, POSE, refusals)
 
 
-def status_reader() -> Reader[StatusMessage]:
+def status_reader(refusals: Refusals | None = None) -> Reader[StatusMessage]:
     """Return a reader of statuses."""
-    return Reader(StatusMessage, STATUS)
+    return Reader(StatusMessage, STATUS, refusals)
 
 
-def alignment_reader() -> Reader[AlignmentMessage]:
+def alignment_reader(refusals: Refusals | None = None) -> Reader[AlignmentMessage]:
     """Return a reader of alignments."""
-    return Reader(AlignmentMessage, ALIGNMENT)
+    return Reader(AlignmentMessage, ALIGNMENT, refusals)
 
 
-def joint_reader() -> Reader[JointMapMessage]:
+def joint_reader(refusals: Refusals | None = None) -> Reader[JointMapMessage]:
     """Return a reader of joint maps."""
-    return Reader(JointMapMessage, JOINT_MAP)
+    return Reader(JointMapMessage, JOINT_MAP, refusals)
 
 
-def joint_status_reader() -> Reader[JointStatusMessage]:
+def joint_status_reader(refusals: Refusals | None = None) -> Reader[JointStatusMessage]:
     """Return a reader of the coordinator's statuses."""
-    return Reader(JointStatusMessage, JOINT_STATUS)
+    return Reader(JointStatusMessage, JOINT_STATUS, refusals)

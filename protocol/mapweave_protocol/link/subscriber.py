@@ -34,6 +34,7 @@ from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, JOINT_STATUS, MAP,
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
+    JointStatusMessage,
     PoseMessage,
     StatusMessage,
 )
@@ -91,8 +92,10 @@ def joint_maps(
         def ask(query: JointQuery) -> list[JointMapMessage]:
             return _ask(session, team, query)
 
+        told = joint_status_reader()
+
         def expect() -> None:
-            _expect(sequence, said)
+            _expect(sequence, said, told)
 
         messages = takewhile(lambda _: not stopping(), _read(joint_reader(), inbox.get, timeout))
         yield from _in_order(sequence, messages, expect, ask)
@@ -190,9 +193,8 @@ def _begin(session: zenoh.Session, team: str) -> JointSequence:
     return sequence
 
 
-def _expect(sequence: JointSequence, said: Inbox) -> None:
+def _expect(sequence: JointSequence, said: Inbox, reader: Reader[JointStatusMessage]) -> None:
     """Have `sequence` expect the versions that the coordinator has said to have."""
-    reader = joint_status_reader()
     while (arrival := said.get(0.0)) is not None:
         status = reader.read(arrival)
         if status is not None:

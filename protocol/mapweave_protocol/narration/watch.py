@@ -31,7 +31,9 @@ from mapweave_protocol.link.inbox import (
     read_presence,
     status_reader,
 )
+from mapweave_protocol.link.refusals import Refusals
 from mapweave_protocol.link.session import declare_subscriber, open_session
+from mapweave_protocol.link.strangers import Strangers
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.narration.story_coverage import CoverageStory
 from mapweave_protocol.narration.story_joint import tell_components
@@ -43,12 +45,13 @@ from mapweave_protocol.wire.keys import (
     MAP,
     STATUS,
 )
-from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
+from mapweave_protocol.wire.messages import JointMapMessage, MapMessage, StatusMessage
 from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.queries import JointQuery
 
 KEPT_LINES = 20  # of the story stay on the terminal
 POLL = 0.5  # [s]
+MAX_ROBOTS = 64  # told of
 HISTORY = {MAP: MESSAGES_TO_COMPLETE, STATUS: 1, ALIGNMENT: 1, JOINT_MAP: 1}
 
 M = TypeVar("M", bound=Message)
@@ -64,12 +67,14 @@ class Watcher:
         self._coverage = CoverageStory()
         self._assembler = MapAssembler()
         self._told: tuple[str, int] | None = None
+        self._strangers = Strangers(self._forget)
+        self._refusals = refusals = Refusals()
         self._tellers: tuple[Teller, ...] = (
             self._tell_presence,
-            _teller(status_reader(), self.story.status),
-            _teller(map_reader(), self._tell_map),
-            _teller(alignment_reader(), self.story.aligned),
-            _teller(joint_reader(), self.tell_joint),
+            _teller(status_reader(refusals), self._tell_status),
+            _teller(map_reader(refusals), self._tell_map),
+            _teller(alignment_reader(refusals), self.story.aligned),
+            _teller(joint_reader(refusals), self.tell_joint),
         )
 
     def tell(self, arrival: Arrival) -> Iterator[str]:
@@ -85,17 +90,35 @@ class Watcher:
             yield from self.story.joined(joint)
             yield from self._coverage.changed(joint)
 
+    def _tell_status(self, message: StatusMessage) -> Iterator[str]:
+        self._note(message.robot)
+        yield from self.story.status(message)
+
+    def _note(self, robot: str) -> None:
+        state = self.story.robots.get(robot)
+        self._strangers.heard(robot, has_map=state is not None and state.map is not None)
+
+    def _forget(self, robot: str) -> None:
+        self.story.robots.pop(robot, None)
+        self._assembler.forget(robot)
+
     def _tell_map(self, message: MapMessage) -> Iterator[str]:
+        self._note(message.robot)
+        mapped = [robot for robot, state in self.story.robots.items() if state.map is not None]
+        if len(mapped) >= MAX_ROBOTS and message.robot not in mapped:
+            return
         robot_map = self._assembler.update(message)
         if robot_map is not None:
             yield from self.story.mapped(robot_map)
 
     def _tell_presence(self, arrival: Arrival) -> Iterator[str]:
-        presence, coordinator = read_presence(arrival), read_coordinator(arrival)
+        presence = read_presence(arrival, self._refusals)
+        coordinator = read_coordinator(arrival, self._refusals)
         if coordinator is not None:
             boot, here = coordinator
             yield from self.story.coordinator(boot, here=here)
         if presence is not None:
+            self._note(presence.robot)
             change = self.story.appeared if presence.here else self.story.left
             yield from change(presence.robot, presence.boot)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from string import Formatter
 
-from mapweave.ids import check_id
+from mapweave.ids import check_id, is_id
 from mapweave_protocol.errors import ForeignKeyError
 
 ANY = "*"
@@ -83,6 +83,24 @@ JOINT_STATUS = KeyFormat("mapweave/v2/{team}/joint/status")
 AGENT_QUERY = KeyFormat("mapweave/v2/{team}/agent/{robot}/query")
 COORDINATOR_LIVE = KeyFormat("mapweave/v2/{team}/live/coordinator/{boot}")
 LIVE = KeyFormat("mapweave/v2/{team}/live/agent/{robot}/{boot}")
+
+
+_SENDER = re.compile(
+    r"mapweave/v[0-9]+/[^/]+/(?:live/)?"
+    r"(?:(?P<coordinator>joint|coordinator)|agent|operator)(?:/(?P<name>[^/]+))?(?:/.*)?"
+)
+UNKNOWN = "unknown"
+COORDINATOR = "coordinator"
+
+
+def sender_of(key: str) -> str:
+    """Return who a message under `key` says it is from: a robot's id, say; not to be believed."""
+    match = _SENDER.fullmatch(key)
+    if match is None:
+        return UNKNOWN
+    if match["coordinator"]:
+        return COORDINATOR
+    return match["name"] if match["name"] and is_id(match["name"]) else UNKNOWN
 
 
 def everything(team: str) -> str:

@@ -213,7 +213,7 @@ def test_hostile_payloads_are_counted_and_warned_of_once_and_the_rest_still_arri
             accepted += [message.robot for message in [reader.read(arrival)] if message is not None]
     assert accepted == ["a"]
     assert reader.refused == 5
-    assert len([record for record in caplog.records if "ignored" in record.message]) == 1
+    assert len([record for record in caplog.records if "refused" in record.message]) == 1
 
 
 def test_a_token_tells_that_a_robot_comes_and_goes(endpoint: str, team: str) -> None:

@@ -1,0 +1,87 @@
+"""A flood of one sender neither delays the others nor takes their place."""
+
+from collections import Counter
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapweave_protocol.link.inbox import Arrival, Inbox
+from mapweave_protocol.wire import keys
+
+
+def _arrival(robot: str, number: int, size: int = 10) -> Arrival:
+    return Arrival(keys.MAP.build(team="t", robot=robot), number.to_bytes(8, "big").ljust(size))
+
+
+def _taken(inbox: Inbox, count: int) -> list[tuple[str, int]]:
+    found = [inbox.get(0.0) for _ in range(count)]
+    return [
+        (keys.sender_of(a.key), int.from_bytes(a.payload[:8], "big"))
+        for a in found
+        if a is not None
+    ]
+
+
+def test_senders_take_turns_each_in_its_own_order() -> None:
+    inbox = Inbox()
+    for number in range(100):
+        inbox.add(_arrival("flood", number))
+    for number in range(3):
+        inbox.add(_arrival("quiet", number))
+    assert _taken(inbox, 6) == [
+        ("flood", 0), ("quiet", 0), ("flood", 1), ("quiet", 1), ("flood", 2), ("quiet", 2),
+    ]  # fmt: skip
+    assert _taken(inbox, 200) == [("flood", number) for number in range(3, 100)]
+    assert inbox.get(0.0) is None
+
+
+def test_a_flood_drops_its_own_oldest_only() -> None:
+    inbox = Inbox(capacity=50)
+    inbox.add(_arrival("quiet", 7))
+    for number in range(1000):
+        inbox.add(_arrival("flood", number))
+    taken = _taken(inbox, 100)
+    assert ("quiet", 7) in taken
+    assert [n for robot, n in taken if robot == "flood"] == list(range(951, 1000))
+    assert inbox.dropped == 951
+
+
+def test_what_waits_is_bounded_in_bytes() -> None:
+    inbox = Inbox(room=10_000)
+    inbox.add(_arrival("quiet", 7))
+    for number in range(100):
+        inbox.add(_arrival("flood", number, size=3000))
+    taken = _taken(inbox, 100)
+    assert ("quiet", 7) in taken
+    assert [n for robot, n in taken if robot == "flood"] == [97, 98, 99]
+    inbox.add(_arrival("large", 1, size=20_000))
+    assert _taken(inbox, 2) == [("large", 1)], "one always fits"
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 3000)), max_size=60))
+def test_nothing_is_lost_or_doubled_while_there_is_room(sent: list[tuple[str, int]]) -> None:
+    inbox = Inbox()
+    for robot, number in sent:
+        inbox.add(_arrival(robot, number))
+    taken = _taken(inbox, 100)
+    assert Counter(taken) == Counter(sent)
+    for robot in "abc":
+        assert [n for r, n in taken if r == robot] == [n for r, n in sent if r == robot]
+
+
+def test_of_several_at_a_key_the_newest_is_taken_and_others_stay() -> None:
+    inbox = Inbox()
+    for number in range(5):
+        inbox.add(_arrival("a", number))
+        inbox.add(_arrival("b", number))
+    newest = [inbox.newest(0.0) for _ in range(3)]
+    assert [a and int.from_bytes(a.payload[:8], "big") for a in newest] == [4, 4, None]
+
+
+def test_who_sends_is_read_from_the_key_and_only_ids_are_names() -> None:
+    assert keys.sender_of("mapweave/v2/t/agent/r1/map") == "r1"
+    assert keys.sender_of("mapweave/v2/t/live/agent/r1/boot") == "r1"
+    assert keys.sender_of("mapweave/v2/t/live/coordinator/boot") == keys.COORDINATOR
+    assert keys.sender_of("mapweave/v2/t/joint/map") == keys.COORDINATOR
+    for key in ("mapweave/v2/t/agent/R 1\n/map", "other/a/b", "", "mapweave/v2/t/agent"):
+        assert keys.sender_of(key) == keys.UNKNOWN
