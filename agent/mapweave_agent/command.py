@@ -3,7 +3,6 @@
 import argparse
 import logging
 import math
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -29,9 +28,14 @@ from mapweave_agent.live.scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.source import ReplayClock, count_selected, parse_rate, told_once
 from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
-from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.arguments import (
+    add_connection_arguments,
+    connection_of,
+    tell_waiting,
+)
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 from mapweave_protocol.wire.keys import new_boot
 
 _log = logging.getLogger(__name__)
@@ -92,15 +96,14 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="earlier runs that ended longer ago are kept, but not sent [s] (default %(default)g)",
     )
     add_connection_arguments(parser)
+    add_log_arguments(parser)
     add_config_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
-    logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S"
-    )
     robot = check_id("robot", options.robot)
-    team, endpoints = connection_of(options)
+    begin_log(options, robot)
+    team, endpoints, link = connection_of(options)
     config = config_of(options)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
     step, warn = config.sensor.angular_step, told_once(_log.warning)
@@ -109,16 +112,13 @@ def _run(options: argparse.Namespace) -> int:
     output = output_of(options.publish, robot, endpoints, source)
     earlier = EarlierRuns.of(team, robot, options.state)
 
-    def tell_waiting() -> None:
-        _log.info("waiting for a router at %s", ", ".join(endpoints))
-
     mapping = MapperParameters.of(config)
     compare = partial(align, parameters=FusionParameters.of(config))
     with (
         output as tell,
         ComparisonWorker(compare) as comparer,
         BackendProcess(mapping.backend) as backend,
-        open_session(endpoints, on_wait=tell_waiting) as session,
+        open_session(endpoints, on_wait=partial(tell_waiting, _log), link=link) as session,
     ):
         live = source.live and not math.isinf(options.rate)
         mapper = Mapper(

@@ -4,9 +4,9 @@ import argparse
 import logging
 import math
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 
 from mapweave.cli import (
@@ -32,9 +32,14 @@ from mapweave_fusion_server.web.address import (
 )
 from mapweave_fusion_server.web.feed import Feed
 from mapweave_fusion_server.web.loading import live_page
-from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.arguments import (
+    add_connection_arguments,
+    connection_of,
+    tell_waiting,
+)
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 
 DEFAULT_INTERVAL: float = CoordinatorParameters().min_interval
 
@@ -43,6 +48,7 @@ _log = logging.getLogger(__name__)
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     add_connection_arguments(parser)
+    add_log_arguments(parser)
     add_config_argument(parser)
     parser.add_argument(
         "--store",
@@ -85,22 +91,17 @@ def _add_retention_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S"
-    )
-    team, endpoints = connection_of(options)
+    begin_log(options, "coordinator")
+    team, endpoints, link = connection_of(options)
     config = config_of(options)
     parameters = CoordinatorParameters(min_interval=options.min_interval)
     path = options.store or default_store(team)
     retention = Retention(options.keep_versions, options.keep_days * DAY)
 
-    def tell_waiting() -> None:
-        _log.info("waiting for a router at %s", ", ".join(endpoints))
-
     with (
         Store(path, team, retention) as store,
         _page(options.http, team, store, config) as feed,
-        open_session(endpoints, on_wait=tell_waiting) as session,
+        open_session(endpoints, on_wait=partial(tell_waiting, _log), link=link) as session,
         nullcontext() if feed is None else feed.positions.heard_on(session, team),
     ):
         Service(session, team, store, parameters, config, feed).run(stop_on_signal())

@@ -40,13 +40,25 @@ class EndpointError(MapweaveError):
         self.endpoints = endpoints
 
 
-class UnreachableError(MapweaveError):
-    """Nobody answered at the endpoints."""
+class NotEncryptedError(EndpointError):
+    """An endpoint that is not encrypted, where keys are used."""
 
-    def __init__(self, endpoints: tuple[str, ...], seconds: float) -> None:
+    def __init__(self, endpoints: tuple[str, ...]) -> None:
+        MapweaveError.__init__(
+            self,
+            f"endpoint {', '.join(endpoints)}: with --tls expected tls/, such as"
+            " tls/localhost:7447",
+        )
+        self.endpoints = endpoints
+
+
+class UnreachableError(MapweaveError):
+    """Nobody answered at the endpoints, or none let us in."""
+
+    def __init__(self, endpoints: tuple[str, ...], seconds: float, reason: str = "") -> None:
         super().__init__(
-            f"no router answered at {', '.join(endpoints)} within {seconds:g} s;"
-            " start one with: mapweave router"
+            f"no router answered at {', '.join(endpoints)} within {seconds:g} s"
+            f"{f' ({reason})' if reason else ''}; start one with: mapweave router"
         )
         self.endpoints = endpoints
         self.seconds = seconds

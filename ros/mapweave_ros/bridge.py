@@ -1,16 +1,16 @@
 """``mapweave bridge``: a team's joint map and poses, on a ROS 2 network."""
 
 import argparse
-import logging
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 
 from mapweave.cli import Command
 from mapweave.maps import JointMap
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.stopping import stop_on_signal
 from mapweave_protocol.link.subscriber import joint_maps, poses
+from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 from mapweave_protocol.wire.messages import PoseMessage
 from mapweave_ros.network import Ros2Network
 from mapweave_ros.output import Ros2Output
@@ -21,6 +21,7 @@ FAREWELL = 2.0  # [s] for a session to be closed
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     add_connection_arguments(parser)
+    add_log_arguments(parser)
     parser.add_argument(
         "--to",
         default="ros2:",
@@ -31,23 +32,23 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    logging.basicConfig(
-        stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S"
-    )
-    team, endpoints = connection_of(options)
+    begin_log(options, "bridge")
+    team, endpoints, link = connection_of(options)
     network = Ros2Network.parse(options.to, endpoints)
     stopping = stop_on_signal()
     with Ros2Output.of_team(network, team) as output:
-        _Following(team, endpoints, output).run(stopping)
+        _Following(team, endpoints, link, output).run(stopping)
     return 0
 
 
 class _Following:
     """Leaves what a team says at an output, each kind from a thread of its own."""
 
-    def __init__(self, team: str, endpoints: Sequence[str], output: Ros2Output) -> None:
+    def __init__(
+        self, team: str, endpoints: Sequence[str], link: LinkSettings, output: Ros2Output
+    ) -> None:
         self._team = team
-        self._endpoints = endpoints
+        self._from = {"connect": endpoints, "link": link}
         self._output = output
         self._over = threading.Event()
         self._failure: BaseException | None = None
@@ -77,7 +78,7 @@ class _Following:
 
     def _follow(self, subscribe: Callable[..., Iterator[JointMap | PoseMessage]]) -> None:
         try:
-            for news in subscribe(self._team, connect=self._endpoints, stopping=self._over.is_set):
+            for news in subscribe(self._team, **self._from, stopping=self._over.is_set):
                 self._output.tell(news)
         except BaseException as error:  # noqa: BLE001 - raised again where it is seen
             self._failure = error

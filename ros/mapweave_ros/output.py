@@ -16,6 +16,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import UnreachableError
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.messages import PoseMessage
 from mapweave_ros.messages import Messages
@@ -129,7 +130,9 @@ def open_when_there(
     told = False
     while not stopping():
         try:
-            return stack.enter_context(open_session(network.endpoints, patience=0.0))
+            # The team's keys are for the team's router, which is an encrypted one.
+            link = None if all(e.startswith("tls/") for e in network.endpoints) else LinkSettings()
+            return stack.enter_context(open_session(network.endpoints, patience=0.0, link=link))
         except UnreachableError:
             if not told:
                 _log.info("waiting for ROS 2's router at %s", ", ".join(network.endpoints))

@@ -141,4 +141,4 @@ def test_scans_of_every_writing_are_mapped_and_noise_between_them_ends_nothing(
         told = [line for line in process.stderr.read().splitlines() if "refused" in line]
     assert len(listener.maps["a"].components) == 1
     assert listener.statuses["a"].scans_placed == len(scans)
-    assert [line.partition(" ")[2].partition(":")[0] for line in told] == ["/odd"] * 2
+    assert [line.split()[4].partition(":")[0] for line in told] == ["/odd"] * 2

@@ -8,12 +8,16 @@ import time
 import zenoh
 
 from mapweave.cli import Command
-from mapweave.errors import MapweaveError
+from mapweave.errors import FileError, MapweaveError
+from mapweave_protocol.link.arguments import add_link_arguments, link_of
+from mapweave_protocol.link.security.roster import Role
 from mapweave_protocol.link.session import router_config
 from mapweave_protocol.link.stopping import stop_on_signal
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
+ENCRYPTED_LISTEN = "tls/127.0.0.1:7447"
 NAP = 0.2  # [s]
+_HERE = re.compile(r"[a-z]+/(127\.[0-9.]+|localhost|\[::1\]):[0-9]+(?:[#?].*)?$")
 
 
 class ListenError(MapweaveError):
@@ -21,6 +25,17 @@ class ListenError(MapweaveError):
 
     def __init__(self, endpoints: list[str], cause: str) -> None:
         super().__init__(f"router: cannot listen at {', '.join(endpoints)} ({cause})")
+        self.endpoints = endpoints
+
+
+class OpenDoorError(MapweaveError):
+    """An endpoint that others reach, and no keys."""
+
+    def __init__(self, endpoints: list[str]) -> None:
+        super().__init__(
+            f"router: whoever reaches {', '.join(endpoints)} may read and write all; expected"
+            " --tls DIR (mapweave keys makes it), or --insecure"
+        )
         self.endpoints = endpoints
 
 
@@ -32,13 +47,29 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="ENDPOINT",
         help=f"where to listen, such as tcp/0.0.0.0:7447; repeatable (default {DEFAULT_LISTEN})",
     )
+    parser.add_argument(
+        "--connect",
+        action="append",
+        metavar="ENDPOINT",
+        help="another router to link with; repeatable",
+    )
+    parser.add_argument(
+        "--insecure", action="store_true", help="listen for other machines without keys, too"
+    )
+    add_link_arguments(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Route until interrupted or terminated."""
-    endpoints: list[str] = options.listen or [DEFAULT_LISTEN]
+    link = link_of(options)
+    encrypted = link.keys is not None
+    endpoints: list[str] = options.listen or [ENCRYPTED_LISTEN if encrypted else DEFAULT_LISTEN]
+    if not encrypted and not options.insecure:
+        _check_here(endpoints)
+    if link.keys is not None and link.keys.member.role is not Role.ROUTER:
+        raise FileError(link.keys.path, "keys of another member; expected those of the router")
     stopping = stop_on_signal()
-    with _open(endpoints):
+    with _open(endpoints, router_config(endpoints, link, options.connect or ())):
         print(f"router: listening at {', '.join(endpoints)}", file=sys.stderr)  # noqa: T201
         while not stopping():
             # In short naps: a signal that another thread takes does not wake this one.
@@ -46,9 +77,16 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _open(endpoints: list[str]) -> zenoh.Session:
+def _check_here(endpoints: list[str]) -> None:
+    """Check that nobody but this machine reaches `endpoints`."""
+    reached = [endpoint for endpoint in endpoints if not _HERE.match(endpoint)]
+    if reached:
+        raise OpenDoorError(reached)
+
+
+def _open(endpoints: list[str], config: zenoh.Config) -> zenoh.Session:
     try:
-        return zenoh.open(router_config(endpoints))
+        return zenoh.open(config)
     except zenoh.ZError as error:
         raise ListenError(endpoints, cause_of(str(error))) from error
 

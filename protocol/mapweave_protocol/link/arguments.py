@@ -1,8 +1,13 @@
 """The arguments that all commands of the service have in common."""
 
 import argparse
+import logging
+import os
+from pathlib import Path
 
 from mapweave.ids import check_id
+from mapweave.text import shown
+from mapweave_protocol.link.security.settings import TLS_VARIABLE, ZENOH_VARIABLE, LinkSettings
 from mapweave_protocol.link.session import DEFAULT_ENDPOINT, ENDPOINT_VARIABLE, default_endpoints
 
 DEFAULT_TEAM = "team"
@@ -20,14 +25,54 @@ def add_connection_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the router is; give several to fall back on"
         f" (default ${ENDPOINT_VARIABLE} or {DEFAULT_ENDPOINT})",
     )
+    add_link_arguments(parser)
 
 
-def connection_of(options: argparse.Namespace) -> tuple[str, tuple[str, ...]]:
-    """Return the team's id and the endpoints that `options` say.
+def add_link_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--tls`` and ``--zenoh-config``; read them with `link_of`."""
+    parser.add_argument(
+        "--tls",
+        type=Path,
+        metavar="DIR",
+        help=f"the keys of this program, as mapweave keys made them (default ${TLS_VARIABLE})",
+    )
+    parser.add_argument(
+        "--zenoh-config",
+        type=Path,
+        metavar="FILE",
+        help=f"settings of Zenoh, taken as far as they undo nothing (default ${ZENOH_VARIABLE})",
+    )
+
+
+def link_of(options: argparse.Namespace) -> LinkSettings:
+    """Return the keys and settings that `options` and the environment name.
+
+    Raises
+    ------
+    FileError
+        If there is no folder of keys.
+    """
+    named = LinkSettings.of_environment({} if options.tls and options.zenoh_config else os.environ)
+    if options.tls:
+        named = LinkSettings.of(options.tls, named.extra)
+    return LinkSettings(named.keys, options.zenoh_config or named.extra)
+
+
+def tell_waiting(log: logging.Logger, reason: str) -> None:
+    """Log why there is no router to be reached yet."""
+    log.info("waiting for a router: %s", shown(reason, 300))
+
+
+def connection_of(options: argparse.Namespace) -> tuple[str, tuple[str, ...], LinkSettings]:
+    """Return the team's id, the endpoints, and the keys and settings that `options` say.
 
     Raises
     ------
     InvalidIdError
         If the team's id is none.
+    FileError
+        If there is no folder of keys.
     """
-    return check_id("team", options.team), tuple(options.connect or default_endpoints())
+    link = link_of(options)
+    endpoints = options.connect or default_endpoints(encrypted=link.keys is not None)
+    return check_id("team", options.team), tuple(endpoints), link

@@ -16,11 +16,15 @@ from typing import Literal, TypeAlias
 import zenoh
 import zenoh.ext as ze
 
-from mapweave_protocol.errors import EndpointError, UnreachableError
+from mapweave_protocol.errors import EndpointError, NotEncryptedError, UnreachableError
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.link.reasons import reason_of
+from mapweave_protocol.link.security.access import access_rules, size_limits
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.wire.codec import MAX_PAYLOAD
 
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
+ENCRYPTED_ENDPOINT = "tls/localhost:7447"
 ENDPOINT_VARIABLE = "MAPWEAVE_CONNECT"
 ATTEMPT = 1.0  # [s] one attempt to connect; between attempts, Ctrl-C is heard
 PAUSE = 0.2  # [s] between attempts
@@ -35,38 +39,57 @@ Mode: TypeAlias = Literal["client", "peer"]
 OnSample: TypeAlias = Callable[[zenoh.Sample], None]
 
 
-def default_endpoints() -> tuple[str, ...]:
+def default_endpoints(*, encrypted: bool = False) -> tuple[str, ...]:
     """Return where the router is: from ``MAPWEAVE_CONNECT``, comma-separated, or this machine."""
-    words = os.environ.get(ENDPOINT_VARIABLE, DEFAULT_ENDPOINT).split(",")
-    return tuple(word.strip() for word in words if word.strip()) or (DEFAULT_ENDPOINT,)
+    words = os.environ.get(ENDPOINT_VARIABLE, "").split(",")
+    here = ENCRYPTED_ENDPOINT if encrypted else DEFAULT_ENDPOINT
+    return tuple(word.strip() for word in words if word.strip()) or (here,)
 
 
-def session_config(endpoints: Sequence[str], mode: Mode = "client") -> zenoh.Config:
+def session_config(
+    endpoints: Sequence[str], mode: Mode = "client", link: LinkSettings | None = None
+) -> zenoh.Config:
     """Return the configuration of a session that connects to `endpoints`.
 
     Raises
     ------
     EndpointError
-        If one is not an endpoint such as ``tcp/localhost:7447``.
+        If one is not an endpoint such as ``tcp/localhost:7447``, or not encrypted where it has to
+        be.
+    FileError
+        If a configuration that a user adds cannot be taken.
     """
-    settings = _common_settings() | {
+    link = link or LinkSettings()
+    settings = _common_settings(link) | {
         "mode": mode,
         "connect/endpoints": list(endpoints),
         "connect/timeout_ms": int(ATTEMPT * 1000),
         "connect/exit_on_failure": True,
     }
-    return _config(settings, endpoints)
+    return _config(settings, endpoints, link)
 
 
-def router_config(listen: Sequence[str]) -> zenoh.Config:
+def router_config(
+    listen: Sequence[str], link: LinkSettings | None = None, connect: Sequence[str] = ()
+) -> zenoh.Config:
     """Return the configuration of a router that listens at the endpoints `listen`.
+
+    Parameters
+    ----------
+    link
+        With keys, only members of the team are let in, each to what is its own.
+    connect
+        Endpoints of other routers.
 
     Raises
     ------
     EndpointError
         If one is not an endpoint such as ``tcp/0.0.0.0:7447``.
+    FileError
+        If a configuration that a user adds cannot be taken.
     """
-    settings = _common_settings() | {
+    link = link or LinkSettings()
+    settings = _common_settings(link) | {
         "mode": "router",
         "listen/endpoints": list(listen),
         "listen/exit_on_failure": True,
@@ -74,12 +97,17 @@ def router_config(listen: Sequence[str]) -> zenoh.Config:
         # With the defaults, 100 idle connections keep newcomers out for 11 s.
         "transport/unicast/accept_timeout": 1000,
         "transport/unicast/accept_pending": 500,
+        "connect/endpoints": list(connect),
+        "connect/exit_on_failure": False,
     }
-    return _config(settings, listen)
+    if link.keys is not None:
+        settings["access_control"] = access_rules(link.keys.roster)
+        settings["low_pass_filter"] = size_limits(link.keys.roster.team)
+    return _config(settings, (*listen, *connect), link)
 
 
-def _common_settings() -> dict[str, object]:
-    return {
+def _common_settings(link: LinkSettings) -> dict[str, object]:
+    return (link.keys.settings() if link.keys else {}) | {
         "scouting/multicast/enabled": False,
         "transport/link/tx/lease": int(LEASE * 1000),
         "transport/link/rx/max_message_size": 2 * MAX_PAYLOAD,
@@ -88,10 +116,14 @@ def _common_settings() -> dict[str, object]:
     }
 
 
-def _config(settings: Mapping[str, object], endpoints: Sequence[str]) -> zenoh.Config:
-    config = zenoh.Config()
+def _config(
+    settings: Mapping[str, object], endpoints: Sequence[str], link: LinkSettings
+) -> zenoh.Config:
+    config = link.base()
     if not endpoints or not all(_is_endpoint(endpoint) for endpoint in endpoints):
         raise EndpointError(tuple(endpoints))
+    if link.keys and not all(endpoint.startswith("tls/") for endpoint in endpoints):
+        raise NotEncryptedError(tuple(endpoints))
     try:
         for path, value in settings.items():
             config.insert_json5(path, json.dumps(value))
@@ -111,7 +143,8 @@ def open_session(
     *,
     mode: Mode = "client",
     patience: float | None = None,
-    on_wait: Callable[[], None] = lambda: None,
+    on_wait: Callable[[str], None] = lambda _: None,
+    link: LinkSettings | None = None,
 ) -> Iterator[zenoh.Session]:
     """Open a session, close it in the end whatever happens.
 
@@ -123,7 +156,9 @@ def open_session(
     patience
         How long to try [s]; None for as long as it takes.
     on_wait
-        Called once when the first attempt failed.
+        Called with the reason when the first attempt failed, and whenever the reason is another.
+    link
+        Keys and settings; those that the environment names unless given.
 
     Raises
     ------
@@ -134,29 +169,33 @@ def open_session(
     """
     if isinstance(endpoints, str):  # a sequence, too: of letters
         endpoints = [endpoints]
-    addresses = default_endpoints() if endpoints is None else tuple(endpoints)
-    with _connect(addresses, mode, patience, on_wait) as session:
+    link = LinkSettings.of_environment() if link is None else link
+    encrypted = link.keys is not None
+    addresses = default_endpoints(encrypted=encrypted) if endpoints is None else tuple(endpoints)
+    with _connect(addresses, mode, link, patience, on_wait) as session:
         yield session
 
 
 def _connect(
     endpoints: tuple[str, ...],
     mode: Mode,
+    link: LinkSettings,
     patience: float | None,
-    on_wait: Callable[[], None],
+    on_wait: Callable[[str], None],
 ) -> zenoh.Session:
     """Try until somebody answers, in short attempts: Ctrl-C does not break into one."""
     started = time.monotonic()
-    waiting = False
+    told = ""
     while True:
         try:
-            return zenoh.open(session_config(endpoints, mode))
+            return zenoh.open(session_config(endpoints, mode, link))
         except zenoh.ZError as error:
+            reason = reason_of(endpoints, link.keys)
             if patience is not None and time.monotonic() - started >= patience:
-                raise UnreachableError(endpoints, patience) from error
-        if not waiting:
-            waiting = True
-            on_wait()
+                raise UnreachableError(endpoints, patience, reason) from error
+        if reason != told:
+            told = reason
+            on_wait(reason)
         time.sleep(PAUSE)
 
 

@@ -28,6 +28,7 @@ from mapweave_protocol.link.inbox import (
     pose_reader,
     status_reader,
 )
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.sequence import SHORT_HISTORY, JointSequence
 from mapweave_protocol.link.session import declare_subscriber, open_session
 from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, JOINT_STATUS, MAP, POSE, STATUS
@@ -54,6 +55,7 @@ def joint_maps(
     connect: Sequence[str] | None = None,
     timeout: float | None = None,
     stopping: Callable[[], bool] = lambda: False,
+    link: LinkSettings | None = None,
 ) -> Iterator[JointMap]:
     """Yield the team's joint maps in the order of their versions, without a gap.
 
@@ -70,6 +72,8 @@ def joint_maps(
         End after this time without a new one [s], above 0; None never ends.
     stopping
         Asked now and then: where it says so, end.
+    link
+        Keys and settings; those that the environment names unless given.
 
     Raises
     ------
@@ -84,7 +88,7 @@ def joint_maps(
     """
     said = Inbox()
     with (
-        _listening(JOINT_MAP.pattern(team=team), connect, timeout, 1) as (session, inbox),
+        _listening(JOINT_MAP.pattern(team=team), connect, timeout, 1, link) as (session, inbox),
         session.declare_subscriber(JOINT_STATUS.build(team=team), said.put),
     ):
         sequence = _begin(session, team)
@@ -102,12 +106,16 @@ def joint_maps(
 
 
 def robot_maps(
-    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    link: LinkSettings | None = None,
 ) -> Iterator[RobotMap]:
     """Yield the robots' maps as they grow; parameters and errors as for `joint_maps`."""
     assembler = MapAssembler()
     key = MAP.pattern(team=team)
-    with _listening(key, connect, timeout, MESSAGES_TO_COMPLETE) as (_, inbox):
+    with _listening(key, connect, timeout, MESSAGES_TO_COMPLETE, link) as (_, inbox):
         for message in _read(map_reader(), inbox.get, timeout):
             robot_map = assembler.update(message) if message else None
             if robot_map is not None:
@@ -115,18 +123,26 @@ def robot_maps(
 
 
 def alignments(
-    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    link: LinkSettings | None = None,
 ) -> Iterator[AlignmentMessage]:
     """Yield what the robots find out about pairs of maps; as for `joint_maps`."""
-    with _listening(ALIGNMENT.pattern(team=team), connect, timeout, 1) as (_, inbox):
+    with _listening(ALIGNMENT.pattern(team=team), connect, timeout, 1, link) as (_, inbox):
         yield from filter(None, _read(alignment_reader(), inbox.get, timeout))
 
 
 def statuses(
-    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    link: LinkSettings | None = None,
 ) -> Iterator[StatusMessage]:
     """Yield the robots' statuses; as for `joint_maps`."""
-    with _listening(STATUS.pattern(team=team), connect, timeout, 1) as (_, inbox):
+    with _listening(STATUS.pattern(team=team), connect, timeout, 1, link) as (_, inbox):
         yield from filter(None, _read(status_reader(), inbox.get, timeout))
 
 
@@ -136,6 +152,7 @@ def poses(
     connect: Sequence[str] | None = None,
     timeout: float | None = None,
     stopping: Callable[[], bool] = lambda: False,
+    link: LinkSettings | None = None,
 ) -> Iterator[PoseMessage]:
     """Yield where the robots are, at the rate of their scans; as for `joint_maps`.
 
@@ -143,7 +160,7 @@ def poses(
     """
     inbox, key = Inbox(MAX_POSES), POSE.pattern(team=team)
     with (
-        open_session(connect, patience=timeout) as session,
+        open_session(connect, patience=timeout, link=link) as session,
         session.declare_subscriber(key, inbox.put),
     ):
         read = _read(pose_reader(), inbox.newest, timeout)
@@ -152,14 +169,18 @@ def poses(
 
 @contextmanager
 def _listening(
-    key: str, connect: Sequence[str] | None, timeout: float | None, history: int
+    key: str,
+    connect: Sequence[str] | None,
+    timeout: float | None,
+    history: int,
+    link: LinkSettings | None,
 ) -> Iterator[tuple[zenoh.Session, Inbox]]:
     """Open a session and an inbox for what is published at `key`."""
     if timeout is not None:
         as_positive("timeout", timeout, "s")
     inbox = Inbox()
     with (
-        open_session(connect, patience=timeout) as session,
+        open_session(connect, patience=timeout, link=link) as session,
         declare_subscriber(session, key, inbox.put, history=history),
     ):
         yield session, inbox

@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mapweave.cli import Command
+from mapweave.text import shown
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.asking import ask_joint_maps
@@ -32,6 +33,7 @@ from mapweave_protocol.link.inbox import (
     status_reader,
 )
 from mapweave_protocol.link.refusals import Refusals
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import declare_subscriber, open_session
 from mapweave_protocol.link.strangers import Strangers
 from mapweave_protocol.narration.story import Story
@@ -132,11 +134,15 @@ def _teller(reader: Reader[M], tell: Callable[[M], Iterator[str]]) -> Teller:
 
 
 def watch(
-    team: str, endpoints: Sequence[str], watcher: Watcher, on_wait: Callable[[], None]
+    team: str,
+    endpoints: Sequence[str],
+    watcher: Watcher,
+    on_wait: Callable[[str], None],
+    link: LinkSettings | None = None,
 ) -> Iterator[str | None]:
     """Yield the lines of the story as it happens, and None now and then while nothing does."""
     inbox = Inbox()
-    with open_session(endpoints, on_wait=on_wait) as session, ExitStack() as subscribers:
+    with open_session(endpoints, on_wait=on_wait, link=link) as session, ExitStack() as subscribers:
         _subscribe(session, team, inbox, subscribers)
         for latest in _ask_latest(session, team):
             yield from watcher.tell_joint(latest)
@@ -196,7 +202,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    team, endpoints = connection_of(options)
+    team, endpoints, link = connection_of(options)
     console = Console()
     waiting = Console(stderr=True)
     watcher = Watcher()
@@ -204,7 +210,8 @@ def _run(options: argparse.Namespace) -> int:
         team,
         endpoints,
         watcher,
-        lambda: waiting.print(f"waiting for a router at {escape(', '.join(endpoints))}"),
+        lambda reason: waiting.print(f"waiting for a router: {escape(shown(reason, 300))}"),
+        link,
     )
     if console.is_terminal:
         _run_live(console, watcher, story)

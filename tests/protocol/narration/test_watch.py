@@ -177,6 +177,6 @@ def test_an_answer_that_is_no_joint_map_is_ignored(
             query.reply(key, b"junk")
 
     with open_session([endpoint]) as session, session.declare_queryable(key, answer):
-        story = watch(team, [endpoint], Watcher(), lambda: None)
+        story = watch(team, [endpoint], Watcher(), lambda _: None)
         assert next(iter(story)) is None
     assert "answer ignored" in caplog.text

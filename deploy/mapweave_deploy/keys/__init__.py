@@ -1,0 +1,1 @@
+"""A team's certificate authority, and the keys it gives out."""

@@ -1,0 +1,63 @@
+"""``mapweave keys``: certificates for a team, and what the router lets each of them do."""
+
+import argparse
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from mapweave.cli import Command, argument, whole
+from mapweave.errors import MissingExtraError
+from mapweave_protocol.link.security.roster import Roster
+
+DEFAULT_DAYS = 365
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("team", metavar="TEAM", help="the team's id")
+    roles = (
+        ("--robots", "each publishes its own map, and nothing else"),
+        ("--operators", "each may mark, pin, forbid and forget"),
+        ("--viewers", "each may look"),
+    )
+    for option, may in roles:
+        parser.add_argument(option, nargs="+", default=[], metavar="ID", help=f"ids; {may}")
+    parser.add_argument(
+        "--hosts",
+        nargs="+",
+        default=[],
+        metavar="HOST",
+        help="names and addresses of the router's machine, as others reach it",
+    )
+    parser.add_argument(
+        "--days",
+        type=argument(whole),
+        default=DEFAULT_DAYS,
+        metavar="N",
+        help=f"how long the certificates are valid (default {DEFAULT_DAYS})",
+    )
+    parser.add_argument(
+        "--output", type=Path, metavar="DIR", help="where to write (default keys-TEAM)"
+    )
+
+
+def _run(options: argparse.Namespace) -> int:
+    roster = Roster(
+        options.team, tuple(options.robots), tuple(options.operators), tuple(options.viewers)
+    )
+    folder = options.output or Path(f"keys-{roster.team}")
+    made = list(_made(roster, folder, options))
+    print(f"{folder}: keys for {', '.join(made) if made else 'nobody new'}")  # noqa: T201
+    return 0
+
+
+def _made(roster: Roster, folder: Path, options: argparse.Namespace) -> Iterator[str]:
+    try:
+        from mapweave_deploy.keys.team_keys import make_keys
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "cryptography":
+            raise
+        raise MissingExtraError("keys", "tls") from error
+    return make_keys(roster, folder, datetime.now(UTC), options.days, options.hosts)
+
+
+command = Command("Make the certificates of a team, and its router's rules.", _configure, _run)

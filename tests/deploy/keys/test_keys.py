@@ -1,0 +1,153 @@
+"""What `mapweave keys` makes, and what is made of it."""
+
+import json
+import stat
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+
+from mapweave.cli import main
+from mapweave.errors import FileError, InvalidIdError
+from mapweave_deploy.keys.team_keys import make_keys
+from mapweave_protocol.link.security.access import access_rules
+from mapweave_protocol.link.security.folder import KeyFolder
+from mapweave_protocol.link.security.roster import Role, Roster
+from mapweave_protocol.link.security.settings import OURS, LinkSettings
+from mapweave_protocol.link.session import session_config
+
+MEMBERS = {
+    "router", "coordinator", "robots/r1", "robots/r2", "operators/ann", "viewers/bob",
+}  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "keys"
+    words = ["keys", "rescue", "--robots", "r1", "r2", "--operators", "ann", "--viewers", "bob"]
+    assert main([*words, "--hosts", "10.0.0.7", "base.local", "--output", str(folder)]) == 0
+    return folder
+
+
+def test_each_member_gets_a_folder_and_keys_are_for_their_owner_only(folder: Path) -> None:
+    assert {str(path.parent.relative_to(folder)) for path in folder.rglob("cert.pem")} == MEMBERS
+    secret = [*folder.rglob("key.pem"), folder / "ca.key"]
+    assert len(secret) == len(MEMBERS) + 1
+    assert {stat.S_IMODE(path.stat().st_mode) for path in secret} == {0o600}
+
+
+def test_only_the_router_is_a_server_and_only_it_has_the_roster(folder: Path) -> None:
+    for place in MEMBERS:
+        certificate = x509.load_pem_x509_certificate((folder / place / "cert.pem").read_bytes())
+        usage = certificate.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
+        assert (x509.oid.ExtendedKeyUsageOID.SERVER_AUTH in usage) == (place == "router")
+        identity = json.loads((folder / place / "member.json").read_text())
+        assert ("robots" in identity) == (place == "router")
+    names = x509.load_pem_x509_certificate((folder / "router" / "cert.pem").read_bytes())
+    reached = names.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert {"localhost", "base.local"} <= set(reached.get_values_for_type(x509.DNSName))
+    assert "10.0.0.7" in map(str, reached.get_values_for_type(x509.IPAddress))
+
+
+def test_nothing_secret_is_printed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["keys", "rescue", "--robots", "r3", "--output", str(folder)]) == 0
+    said = capsys.readouterr()
+    assert "PRIVATE" not in said.out + said.err
+    assert len(said.out.splitlines()) == 1
+
+
+def test_a_team_grows_and_who_has_keys_keeps_them(folder: Path) -> None:
+    before = {path: path.read_bytes() for path in folder.rglob("*.pem")}
+    assert main(["keys", "rescue", "--robots", "r3", "--output", str(folder)]) == 0
+    assert {path: path.read_bytes() for path in before} == before
+    assert KeyFolder.read(folder / "router").roster.robots == ("r1", "r2", "r3")
+    assert KeyFolder.read(folder / "robots" / "r3").member.role is Role.ROBOT
+
+
+def test_a_folder_of_another_team_is_left_as_it_is(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["keys", "office", "--robots", "r1", "--output", str(folder)]) == 1
+    assert "the keys of another team" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["R1", "r1/..", "", "r.1", "x" * 33])
+def test_a_name_that_is_no_id_gets_no_keys(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InvalidIdError):
+        list(make_keys(Roster("rescue", (name,)), tmp_path, datetime.now(UTC), 1, []))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_name_is_another_s(folder: Path) -> None:
+    roster = Roster("rescue", ("ann", "coordinator"), ("ann",), ("ann",))
+    names = [member.common_name for member in roster.members]
+    assert len(set(names)) == len(names)
+    rules = access_rules(roster)
+    assert isinstance(rules["policies"], list)
+    assert len(rules["policies"]) == len(names)
+    assert folder.exists()
+
+
+def test_a_key_that_others_may_read_is_refused(folder: Path) -> None:
+    (folder / "robots" / "r1" / "key.pem").chmod(0o640)
+    with pytest.raises(FileError, match="chmod 600"):
+        KeyFolder.read(folder / "robots" / "r1")
+
+
+@pytest.mark.parametrize("name", ["ca.pem", "cert.pem", "key.pem", "member.json"])
+def test_what_is_missing_in_a_folder_is_named(folder: Path, name: str) -> None:
+    (folder / "robots" / "r1" / name).unlink()
+    with pytest.raises(FileError, match=name):
+        KeyFolder.read(folder / "robots" / "r1")
+
+
+def test_the_router_does_not_listen_to_others_without_keys(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for endpoint in ("tcp/0.0.0.0:7447", "tcp/192.168.1.10:7447", "tcp/[::]:7447", "udp/host:1"):
+        assert main(["router", "--listen", endpoint]) == 1
+        assert "--tls" in capsys.readouterr().err
+
+
+def test_the_router_takes_no_keys_but_its_own(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["router", "--tls", str(folder / "robots" / "r1")]) == 1
+    assert "expected those of the router" in capsys.readouterr().err
+
+
+SETTINGS = {
+    "qos": '{qos: {publication: [{key_exprs: ["**"], config: {congestion_control: "block"}}]}}',
+    "mode": '{mode: "peer"}',
+    "access_control": '{access_control: {enabled: true, default_permission: "allow"}}',
+    "transport/link/tls": "{transport: {link: {tls: {enable_mtls: false}}}}",
+    "transport/shared_memory": "{transport: {shared_memory: {enabled: true, mode: 'init'}}}",
+}
+
+
+@pytest.mark.parametrize("path", SETTINGS)
+def test_settings_that_would_undo_ours_are_refused_with_the_reason(
+    tmp_path: Path, path: str
+) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.write_text(SETTINGS[path])
+    with pytest.raises(FileError) as told:
+        session_config(["tcp/localhost:7447"], link=LinkSettings(extra=file))
+    assert str(told.value) == f"{file}: {path}: not to be set here: {OURS[path]}"
+
+
+def test_other_settings_are_taken_under_ours(tmp_path: Path) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.write_text('{transport: {unicast: {max_sessions: 7}}, metadata: {name: "base"}}')
+    config = session_config(["tcp/localhost:7447"], link=LinkSettings(extra=file))
+    assert config.get_json("transport/unicast/max_sessions") == "7"
+    assert config.get_json("mode") == '"client"'
+
+
+def test_a_file_that_is_no_configuration_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "zenoh.json5"
+    file.write_text("{mode: ")
+    for path in (file, tmp_path / "nowhere.json5"):
+        with pytest.raises(FileError, match=path.name):
+            session_config(["tcp/localhost:7447"], link=LinkSettings(extra=path))
