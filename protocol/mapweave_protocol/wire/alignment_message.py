@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.maps import Alignment, Decision, RobotMap, parse_component
 from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
+from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.model import (
     MAX_ALIGNMENTS,
     ComponentName,
@@ -174,6 +175,7 @@ class AlignmentMessage(Message):
     """
 
     format: ClassVar[str] = "mapweave/alignment-message/1"
+    budget: ClassVar[Budget] = Budget(4 * MIB, 8 * MIB, 300_000)
 
     robot: Id
     reference: MapVersion

@@ -7,11 +7,14 @@ bounded by a multiple of its own bytes, and by a limit of its kind.
 
 from dataclasses import dataclass
 
-MAX_DEPTH = 12  # of arrays and maps in each other; our messages have six
-BYTES_OF_A_BYTE = 64  # decompressed: ours come to 20
+MAX_DEPTH = 16  # of arrays and maps in each other; reasons about reasons come to 12
+BYTES_OF_A_BYTE = 32  # decompressed: ours come to 20
 BYTES_OF_NONE = 64 * 2**10
 OBJECTS_OF_A_BYTE = 16  # of the payload: ours come to 3
 OBJECTS_OF_NONE = 4096
+
+
+KIB, MIB = 2**10, 2**20
 
 
 @dataclass(frozen=True, slots=True)

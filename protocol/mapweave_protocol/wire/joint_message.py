@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from mapweave.maps import JointComponent, JointMap
 from mapweave_protocol.wire import packing
 from mapweave_protocol.wire.alignment_message import WireAlignment
+from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.geometry import MAX_BYTES, MAX_SEGMENTS, PackedLines
 from mapweave_protocol.wire.model import (
     JOINT_REACH,
@@ -81,6 +82,7 @@ class JointMapMessage(Message):
     """
 
     format: ClassVar[str] = "mapweave/joint-message/1"
+    budget: ClassVar[Budget] = Budget(16 * MIB, 32 * MIB, 300_000)
 
     series: Id
     version: int = Field(ge=1, le=2**53)

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from mapweave.maps import JointMap, parse_component
 from mapweave_protocol.wire.alignment_message import MapVersion
+from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.model import (
     MAX_ALIGNMENTS,
     ComponentName,
@@ -57,6 +58,7 @@ class JointStatusMessage(Message):
     """
 
     format: ClassVar[str] = "mapweave/coordinator-message/1"
+    budget: ClassVar[Budget] = Budget(4 * MIB, 8 * MIB, 150_000)
 
     boot: Id
     stamp: Number

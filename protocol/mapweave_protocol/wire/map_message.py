@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from mapweave.maps import RobotMap, Submap
 from mapweave_protocol.wire import packing
+from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.geometry import (
     DIGEST_SIZE,
     MAX_BYTES,
@@ -52,6 +53,7 @@ class MapMessage(Message):
     """
 
     format: ClassVar[str] = "mapweave/map-message/1"
+    budget: ClassVar[Budget] = Budget(16 * MIB, 32 * MIB, 50_000)
 
     robot: Id
     boot: Id

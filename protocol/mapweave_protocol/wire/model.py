@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import ID_PATTERN
+from mapweave_protocol.wire.budget import Budget
 
 WORLD_REACH = 1e5  # [m] from a component's origin
 JOINT_REACH = 1e9  # [m]; alignments within WORLD_REACH add up along a chain of components
@@ -44,9 +45,10 @@ class WireModel(BaseModel):
 
 
 class Message(WireModel):
-    """A message; `format` names it and the version of its layout."""
+    """A message; `format` names it and the version of its layout, `budget` bounds it."""
 
     format: ClassVar[str]
+    budget: ClassVar[Budget]
 
 
 def to_transform(pose: FloatArray) -> Transform:

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray
+from mapweave_protocol.wire.budget import KIB, Budget
 from mapweave_protocol.wire.model import (
     ComponentName,
     Count,
@@ -71,6 +72,7 @@ class PoseMessage(Message):
     """
 
     format: ClassVar[str] = "mapweave/pose-message/1"
+    budget: ClassVar[Budget] = Budget(16 * KIB, 16 * KIB, 256)
 
     robot: Id
     boot: Id

@@ -5,6 +5,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from mapweave_protocol.wire.alignment_message import MapVersion
+from mapweave_protocol.wire.budget import KIB, MIB, Budget
 from mapweave_protocol.wire.model import Count, Id, Label, Message, Number, WireModel
 
 MAX_PEERS = 1024
@@ -47,6 +48,7 @@ class StatusMessage(Message):
     """
 
     format: ClassVar[str] = "mapweave/status-message/1"
+    budget: ClassVar[Budget] = Budget(256 * KIB, 2 * MIB, 30_000)
 
     robot: Id
     boot: Id

@@ -13,7 +13,7 @@ from mapweave.geometry import se2
 from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.wire.codec import MAX_BODY, decode, encode
+from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.geometry import PackedLines
 from mapweave_protocol.wire.joint_status_message import Place
 from mapweave_protocol.wire.messages import (
@@ -338,7 +338,7 @@ def envelope(message: Message, body: bytes) -> bytes:
 
 
 def test_a_bomb_is_refused_before_it_unfolds() -> None:
-    bomb = zlib.compress(bytes(MAX_BODY + 1))
+    bomb = zlib.compress(bytes(MapMessage.budget.body + 1))
     payload = msgpack.packb({"format": MapMessage.format, "deflated": True, "body": bomb})
     with pytest.raises(MessageError, match="decompressed"):
         decode(MapMessage, payload)
