@@ -208,7 +208,7 @@ class Localizer:
 
     def _search(self) -> None:
         """Look for what was seen lately: anywhere, or where it should be."""
-        if self._searching is not None:
+        if self._searching is not None or self._recollection.count == 0:
             return
         looked_back = self.parameters.finder.recent.kept
         if self._place is not None:
