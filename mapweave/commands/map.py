@@ -18,10 +18,12 @@ from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave.ids import check_id
+from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import STANDARD_INPUT, ScanSource, open_source
+from mapweave.mapping.grids.grid_map import map_of_grid
 from mapweave.mapping.localization.localizer import Localizer
 from mapweave.mapping.mapper import Mapper
 from mapweave.mapping.scan_mapper import ScanMapper
@@ -35,8 +37,8 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "log",
         metavar="LOG",
-        help="CARMEN, TORO or g2o, may be gzipped; a ROS bag, a file or a folder; or - for lines of"
-        " JSON on standard input",
+        help="CARMEN, TORO or g2o, may be gzipped; a ROS bag, a file or a folder; the .yaml of a"
+        " map_server grid; or - for lines of JSON on standard input",
     )
     add_topic_argument(parser)
     parser.add_argument("--output", metavar="MAP.json", type=Path, help="the map file to write")
@@ -73,17 +75,37 @@ def _run(options: argparse.Namespace) -> int:
     stored = [path for path in (options.continued, options.localize) if path is not None]
     check_outputs([options.output, options.plot], [*inputs, *stored])
     start = Start.of(options)
+    if is_grid(Path(options.log)):
+        return _run_grid(options, config)
     step, prior = config.sensor.angular_step, options.odometry == "prior"
     source = open_source(options.log, ReadOptions(prior, step, options.topic, _warn))
     mapper = _mapper(options.robot, start, config)
     robot_map, taken = _map_all(options, source, mapper)
     _check_placed(options, _new(robot_map, start), taken)
+    _write(options, robot_map)
+    print(_summary(_new(robot_map, start), taken))  # noqa: T201
+    return 0
+
+
+def _run_grid(options: argparse.Namespace, config: Config) -> int:
+    """Turn another program's grid into a map."""
+    for given, name in ((options.continued, "--continue"), (options.localize, "--localize")):
+        if given is not None:
+            raise FileError(options.log, f"is a grid; expected a log to take {name} with")
+    robot_map = map_of_grid(read_grid(Path(options.log)), options.robot or ROBOT, config)
+    if not robot_map.submaps:
+        raise FileError(options.log, "no wall of it can be seen from its free cells; expected some")
+    _write(options, robot_map)
+    lines = robot_map.submaps[0].map
+    print(f"{len(lines.polylines)} polylines, {len(lines.segments)} segments")  # noqa: T201
+    return 0
+
+
+def _write(options: argparse.Namespace, robot_map: RobotMap) -> None:
     if options.output:
         save(robot_map, options.output)
     if options.plot:
         plot(robot_map, options.plot)
-    print(_summary(_new(robot_map, start), taken))  # noqa: T201
-    return 0
 
 
 def _mapper(robot: str | None, start: Start, config: Config) -> ScanMapper:

@@ -157,3 +157,18 @@ def test_a_robot_that_is_in_the_joint_map_already_is_refused(tmp_path: Path) -> 
 def test_beams_of_the_drive_are_evenly_spread() -> None:
     """What `as_g2o` relies on."""
     np.testing.assert_allclose(np.diff(AROUND[45:316:2]), AROUND[2] - AROUND[0])
+
+
+def test_a_map_servers_grid_becomes_a_robots_map_and_takes_no_start(tmp_path: Path) -> None:
+    room = part(BUILDING, 0, 18)
+    stored, grid, output = (tmp_path / name for name in ("a.json", "grid.yaml", "g.json"))
+    write_map(stored, RobotMap("a", "0", 1, (Submap(0, 0, np.zeros(3), room, Trajectory.empty()),)))
+    assert main_here("export", stored, grid).returncode == 0
+    done = mapweave("map", grid, "--robot", "g", "--output", output)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "polylines" in done.stdout
+    found = read_map(output)
+    assert (found.robot, found.components) == ("g", [0])
+    assert main_here("fuse", stored, output).returncode == 0
+    done = main_here("map", grid, "--localize", stored)
+    assert_fails_in_one_line(done, grid, "is a grid; expected a log", "--localize")
