@@ -45,11 +45,12 @@ def test_what_was_exported_is_read_back_within_a_cell(turn: float, tmp_path: Pat
     export(stored(lines, pose), tmp_path / "map.yaml")
     found = map_of_grid(read_grid(tmp_path / "map.yaml"), "g").lines(0)
     expected = lines.moved(pose)
-    assert distance(along(found.segments), expected.segments).max() < A_CELL
-    assert distance(along(expected.segments), found.segments).max() < A_CELL
+    for one, other in ((found, expected), (expected, found)):
+        apart = distance(along(one.segments), other.segments)
+        assert np.quantile(apart, 0.99) < A_CELL
+        assert apart.max() < 2 * RESOLUTION  # the tips of corners
     free = [from_rings(each.free_space) for each in (found, expected)]
-    apart = shapely.symmetric_difference(*free).area
-    assert apart < 0.04 * free[1].area
+    assert shapely.symmetric_difference(*free).area < 0.04 * free[1].area
 
 
 def test_a_walls_visible_side_is_the_free_one() -> None:
