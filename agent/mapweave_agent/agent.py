@@ -305,6 +305,8 @@ class AgentRun:
             compared=dict(self._comparisons.published),
             holds=self._comparisons.held,
             sent=dict(self._outbox.sent),
+            refused=self._reception.refusals.told,
+            dropped=self._inbox.dropped,
         )
         self._outbox.send_status(status)
         self._status_due = time.monotonic() + self._parameters.status_interval

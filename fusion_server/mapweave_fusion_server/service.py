@@ -183,6 +183,9 @@ class Service:
             maps=self._coordinator.maps_held,
             alignments=self._coordinator.alignments_held,
             frames=self._frames,
+            refused=self._intake.refusals.told,
+            dropped=self._inbox.dropped,
+            stored=self._store.is_storing,
         )
         self._statuses.put(encode(status))
         self._feed.show_team(
@@ -193,6 +196,10 @@ class Service:
                 stamp=status.stamp,
                 pending=status.pending,
                 refused=self._intake.refused,
+                refusals=self._intake.refusals.counts,
+                dropped=self._inbox.dropped,
+                storing=self._store.is_storing,
+                damaged=self._store.damaged,
             ),
         )
 

@@ -1,7 +1,9 @@
 """What the coordinator hands over to those who look: immutable values, never waited for."""
 
+import math
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -49,6 +51,14 @@ class CoordinatorReport:
         Whether something was received that is in no version yet.
     refused
         Messages that were not valid and dropped.
+    refusals
+        The same by who sent them and what they were.
+    dropped
+        Messages that found no room.
+    storing
+        Whether versions are stored; not while the disk is full.
+    damaged
+        Rows of the store that could not be read.
     """
 
     boot: str = ""
@@ -56,6 +66,10 @@ class CoordinatorReport:
     stamp: float = 0.0
     pending: bool = False
     refused: int = 0
+    refusals: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    dropped: int = 0
+    storing: bool = True
+    damaged: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +108,13 @@ class Feed:
         self.positions = Positions()
         self._lock = threading.Lock()
         self._seen = Seen()
+        self._told = -math.inf
         self._listeners: tuple[Listener, ...] = ()
+
+    @property
+    def age(self) -> float:
+        """How long ago the coordinator said how it is [s]; infinite before it did."""
+        return time.monotonic() - self._told
 
     @property
     def seen(self) -> Seen:
@@ -122,6 +142,7 @@ class Feed:
         """Hand over how robots and coordinator are."""
         with self._lock:
             self._seen = replace(self._seen, robots=robots, coordinator=coordinator)
+            self._told = time.monotonic()
         self._tell()
 
     def _tell(self) -> None:

@@ -61,4 +61,8 @@ def _coordinator(team: str, series: str, version: int, report: CoordinatorReport
         "stamp": report.stamp,
         "pending": report.pending,
         "refused": report.refused,
+        "refusals": [[*who, count] for who, count in sorted(report.refusals.items())],
+        "dropped": report.dropped,
+        "storing": report.storing,
+        "damaged": report.damaged,
     }

@@ -19,6 +19,7 @@ from starlette.types import ASGIApp
 
 from mapweave.config import Config
 from mapweave.errors import ArgumentError
+from mapweave_fusion_server.monitoring import monitoring_routes
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.api import Api
@@ -101,6 +102,7 @@ def application(address: HttpAddress, knowledge: Knowledge, bell: Bell, token: s
         Route("/api", _page("api.html")),
         Route("/api/openapi.json", _page("openapi.json")),
         *Api(knowledge, bell).routes,
+        *monitoring_routes(knowledge.feed),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     handlers = {HTTPException: _tell}

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from mapweave.text import shown
+from mapweave_protocol.wire.status_message import MAX_REFUSED
 
 INTERVAL = 60.0  # [s] between two lines about one kind
 MOST_SENDERS = 64  # names come from the network: those after count as one
@@ -47,6 +48,11 @@ class Refusals:
     def counts(self) -> Mapping[tuple[str, str], int]:
         """How many of each sender and kind."""
         return dict(self._counts)
+
+    @property
+    def told(self) -> dict[str, int]:
+        """What goes into a status: the most frequent ones, as ``r1 map``."""
+        return {f"{who} {kind}": n for (who, kind), n in self._counts.most_common(MAX_REFUSED)}
 
     def add(self, sender: str, kind: str, where: str, why: object) -> None:
         """Count one, and tell it unless one of its kind was told a short while ago.

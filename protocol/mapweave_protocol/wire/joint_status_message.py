@@ -13,12 +13,13 @@ from mapweave_protocol.wire.model import (
     Count,
     Id,
     JointTransform,
+    Label,
     Message,
     Number,
     WireModel,
     to_transform,
 )
-from mapweave_protocol.wire.status_message import MAX_PEERS
+from mapweave_protocol.wire.status_message import MAX_PEERS, MAX_REFUSED
 
 
 class Place(WireModel):
@@ -55,6 +56,10 @@ class JointStatusMessage(Message):
         For each pair of robots whose alignments are held, of which states of the maps.
     frames
         Where each component of the latest version is: enough to say where a robot is in it.
+    refused, dropped
+        As in a robot's status.
+    stored
+        Whether versions are stored; not while the disk is full.
     """
 
     format: ClassVar[str] = "mapweave/coordinator-message/1"
@@ -70,6 +75,9 @@ class JointStatusMessage(Message):
         default=(), max_length=MAX_ALIGNMENTS
     )
     frames: dict[ComponentName, Place] = Field(default_factory=dict, max_length=MAX_ALIGNMENTS)
+    refused: dict[Label, Count] = Field(default_factory=dict, max_length=MAX_REFUSED)
+    dropped: Count = 0
+    stored: bool = True
 
 
 def frames_of(joint: JointMap | None) -> dict[str, Place]:

@@ -9,6 +9,7 @@ from mapweave_protocol.wire.budget import KIB, MIB, Budget
 from mapweave_protocol.wire.model import Count, Id, Label, Message, Number, WireModel
 
 MAX_PEERS = 1024
+MAX_REFUSED = 64  # kinds of several senders
 
 
 class Compared(WireModel):
@@ -45,6 +46,10 @@ class StatusMessage(Message):
         Which state of each peer's map is held.
     sent
         By kind of message: ``map``, ``alignment``, ``pose``, ``status``.
+    refused
+        How many messages were refused, by who sent them and what they were, such as ``r2 map``.
+    dropped
+        How many found no room.
     """
 
     format: ClassVar[str] = "mapweave/status-message/1"
@@ -65,3 +70,5 @@ class StatusMessage(Message):
     compared: dict[Id, Compared] = Field(default_factory=dict, max_length=MAX_PEERS)
     holds: tuple[MapVersion, ...] = Field(default=(), max_length=MAX_PEERS)
     sent: dict[Label, Traffic] = Field(default_factory=dict, max_length=16)
+    refused: dict[Label, Count] = Field(default_factory=dict, max_length=MAX_REFUSED)
+    dropped: Count = 0
