@@ -7,6 +7,7 @@ they stand as the first argument of ``command = Command("…", …)``.
 
 import argparse
 import ast
+import errno
 import math
 import os
 import sys
@@ -29,6 +30,7 @@ COMMAND_GROUP = "mapweave.commands"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
+NO_ROOM = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO}
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +193,15 @@ def _report(words: list[str]) -> int:
         print("mapweave: interrupted", file=sys.stderr)  # noqa: T201
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has gone; Python would complain again when flushing at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_FAILED
+        return _give_up_output()
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            raise
+        print(f"mapweave: cannot write ({error.strerror})", file=sys.stderr)  # noqa: T201
+        return _give_up_output()
+
+
+def _give_up_output() -> int:
+    """Write no more: Python would complain again when flushing at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return EXIT_FAILED

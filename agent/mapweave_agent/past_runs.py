@@ -58,6 +58,7 @@ class StateFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._sender = MapSender()
+        self._has_room = True
         try:
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -66,14 +67,21 @@ class StateFolder:
     def keep(self, robot_map: RobotMap) -> None:
         """Keep the map of a run in place of the last one of that run.
 
-        Raises
-        ------
-        FileError
-            If it cannot be written.
+        Where there is no room for it, the last one stays; that is told once, as is when there is
+        room again: a full disk must not keep a robot from its work.
         """
         payload = self._sender.payload(robot_map, complete=True)
-        with replace_file(self.path / f"{robot_map.boot}{SUFFIX}") as new:
-            new.write_bytes(payload)
+        try:
+            with replace_file(self.path / f"{robot_map.boot}{SUFFIX}") as new:
+                new.write_bytes(payload)
+        except FileError as error:
+            if self._has_room:
+                _log.error("%s: going on, the map is not kept until there is room", error)
+            self._has_room = False
+            return
+        if not self._has_room:
+            _log.info("the map is kept again, in %s", self.path)
+        self._has_room = True
 
     def runs(self, robot: str, now: float) -> list[PastRun]:
         """Return the runs of `robot`, the earliest first; `now` [s since 1970].

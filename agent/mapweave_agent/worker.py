@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from types import TracebackType
@@ -50,15 +51,18 @@ class Worker:
         self._process = _SPAWN.Process(
             target=self._serve, args=(theirs, self._argument), daemon=True
         )
+        # Ctrl-C goes to the whole group; one that is just being born would leave a trace of it.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         self._process.start()
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         # Only the process holds its end now: each side sees when the other one is gone.
         theirs.close()
 
 
 def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None:
     """Answer what comes through `pipe`, by `of`, until its other end is closed."""
-    # Ctrl-C goes to the whole group; the agent ends this process itself.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the agent ends this process itself
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     os.nice(niceness)
     while True:
         try:
@@ -66,3 +70,11 @@ def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None
         except EOFError:
             return
         pipe.send(of(asked))
+
+
+def _end_with_parent() -> None:
+    """End the process when the one that started it is gone, whatever is being computed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

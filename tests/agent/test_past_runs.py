@@ -1,5 +1,8 @@
 """What a robot keeps of its runs on disk, and goes on from."""
 
+import errno
+import logging
+import os
 from pathlib import Path
 
 import numpy as np
@@ -75,3 +78,24 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(FileError, match="file/state"):
         StateFolder(tmp_path / "file" / "state")
+
+
+def test_a_full_disk_is_told_once_and_the_map_is_kept_when_there_is_room(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caplog.set_level(logging.INFO)
+    folder = StateFolder(tmp_path / "state")
+    folder.keep(a_map(0))
+    with monkeypatch.context() as full:
+        full.setattr(Path, "write_bytes", _no_room)
+        for _ in range(3):
+            folder.keep(a_map(0, 1))
+    assert [run.map.components for run in folder.runs("a", 0.0)] == [[0]]
+    folder.keep(a_map(0, 1))
+    assert [run.map.components for run in folder.runs("a", 0.0)] == [[0, 1]]
+    assert len([line for line in caplog.messages if "until there is room" in line]) == 1
+    assert len([line for line in caplog.messages if "kept again" in line]) == 1
+
+
+def _no_room(*_: object) -> int:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

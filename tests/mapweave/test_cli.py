@@ -1,8 +1,10 @@
 """The program finds its subcommands by entry point, and turns errors into a line and a status."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from importlib.metadata import entry_points, version
 from pathlib import Path
@@ -12,6 +14,8 @@ import pytest
 from mapweave import cli
 from mapweave.cli import main
 from mapweave.errors import FileError, InvalidIdError, MissingExtraError
+
+MAPWEAVE = Path(sys.executable).with_name("mapweave")
 
 
 @pytest.fixture
@@ -175,3 +179,37 @@ def test_errors_carry_what_they_are_about() -> None:
     assert (error.path, error.problem) == (Path("a/b.json"), "is empty")
     assert InvalidIdError("robot", "A").name == "A"
     assert MissingExtraError("A picture", "plot").extra == "plot"
+
+
+def test_an_output_without_room_is_told_in_one_line() -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no device that is always full")
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [MAPWEAVE, "config"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == cli.EXIT_FAILED
+    assert done.stderr == "mapweave: cannot write (No space left on device)\n"
+
+
+EARLY = """
+import sys
+from mapweave import __main__ as program
+print("heard from here on", file=sys.stderr, flush=True)
+sys.argv[:] = ["mapweave", "server", "--connect", "tcp/127.0.0.1:9", "--store", sys.argv[1]]
+sys.exit(program.main())
+"""
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.02, 0.1, 0.3, 0.6, 1.2])
+def test_ctrl_c_however_early_leaves_no_traceback(seconds: float, tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", EARLY, tmp_path / "store"], stderr=subprocess.PIPE, text=True
+    )
+    assert process.stderr is not None
+    assert process.stderr.readline() == "heard from here on\n"
+    time.sleep(seconds)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60.0)
+    assert "Traceback" not in said
+    assert process.returncode in (cli.EXIT_INTERRUPTED, -signal.SIGINT)
