@@ -28,7 +28,8 @@ class JointStatusMessage(Message):
         For each pair of robots whose alignments are held, of which states of the maps.
     """
 
-    format: ClassVar[str] = "mapweave/coordinator-message/1"
+    kind: ClassVar[bytes] = b"c"
+    format: ClassVar[str] = "coordinator status"
 
     boot: Id
     stamp: Number
