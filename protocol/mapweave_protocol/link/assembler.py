@@ -7,8 +7,6 @@ has it.
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from mapweave.maps import RobotMap, Submap
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.geometry import PackedSubmap
@@ -74,7 +72,6 @@ class _Held:
 
     version: int
     packed: PackedSubmap
-    submap: Submap
 
 
 @dataclass
@@ -127,7 +124,7 @@ class _Run:
         if held is not None and held.packed.digest == packed.digest:
             held.version = max(held.version, version)  # and the same object still
         elif held is None or held.version <= version:
-            self.held[packed.id] = _Held(version, packed, packed.unpack(0, np.zeros(3)))
+            self.held[packed.id] = _Held(version, packed)
 
     def _take_place(self, submap: int, place: Place | None, version: int) -> None:
         if submap not in self.places or self.places[submap][0] <= version:
@@ -141,7 +138,7 @@ class _Run:
         return state_of((p, self.held[p.id].packed.digest) for p in present) == state
 
     def _placed(self, place: Place) -> Submap:
-        submap = self.held[place.id].submap
+        submap = self.held[place.id].packed.restored
         return replace(submap, component=place.component, pose=place.pose)
 
 

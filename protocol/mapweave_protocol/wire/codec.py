@@ -1,9 +1,10 @@
 """Messages to bytes and back.
 
 A payload is ``mw``, a byte with the version of the wire, a letter for the kind of message, a byte
-that tells how the body is packed, and the body: the msgpack of an array of the message's values,
-compressed when that made it smaller. Whatever the bytes, decoding gives a valid message or raises
-`MessageError`, and allocates no more than a small multiple of the bounds.
+that tells how the body is packed, and the body: the msgpack of an array of the message's values (a
+map of them by name is read as well), compressed when that made it smaller. Whatever the bytes,
+decoding gives a valid message or raises `MessageError`, and allocates no more than a small multiple
+of the bounds.
 """
 
 import zlib
@@ -59,8 +60,6 @@ def decode(kind: type[M], payload: bytes) -> M:
     if len(payload) > MAX_PAYLOAD:
         raise MessageError(kind.format, f"{len(payload)} bytes, expected at most {MAX_PAYLOAD}")
     fields = _unpack(kind, _body(kind, payload))
-    if not isinstance(fields, tuple):
-        raise MessageError(kind.format, "expected an array of values")
     try:
         return kind.model_validate(fields)
     except ValidationError as error:

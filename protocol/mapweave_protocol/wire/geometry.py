@@ -133,8 +133,9 @@ class PackedSubmap:
         columns = [*self.lines.columns, np.array(self.trajectory.rows.shape), self.trajectory.rows]
         return digest_of(columns)
 
-    def unpack(self, component: int, pose: FloatArray) -> Submap:
-        """Return the submap, with the `component` and ``(3,)`` `pose` given apart.
+    @cached_property
+    def restored(self) -> Submap:
+        """The submap, at the origin of component 0.
 
         Raises
         ------
@@ -142,7 +143,7 @@ class PackedSubmap:
             If something is out of bounds.
         """
         lines = self.lines.unpack(SUBMAP_REACH)
-        return Submap(self.id, component, pose, lines, self.trajectory.restore(SUBMAP_REACH))
+        return Submap(self.id, 0, np.zeros(3), lines, self.trajectory.restore(SUBMAP_REACH))
 
 
 def digest_of(columns: list[IntArray]) -> bytes:

@@ -185,8 +185,11 @@ class MapMessage(Message):
                 raise ValueError("submaps, expected each once, ids ascending")
         if self.complete and (places != submaps or self.changes.gone):
             raise ValueError("said to be complete, but submaps are missing")
+        # What is out of bounds is refused now, not where it is used.
         for place in self.changes.places:
-            place.pose  # noqa: B018  # checked while the sender is at hand
+            place.pose  # noqa: B018
+        for submap in self.changes.submaps:
+            submap.restored  # noqa: B018
         return self
 
     @cached_property

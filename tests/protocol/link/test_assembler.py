@@ -54,7 +54,7 @@ def sent_by(maps: list[RobotMap]) -> list[MapMessage]:
 
 
 @given(st.integers(0, 2**31), st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_whatever_is_lost_or_late_no_wrong_map_is_put_together(
     random_map: MakeMap, seed: int, data: st.DataObject
 ) -> None:
@@ -172,9 +172,9 @@ def test_a_cache_of_that_many_messages_always_holds_a_complete_one(random_map: M
 
 
 def test_a_large_map_is_repeated_after_so_many_messages_however_little_changes() -> None:
-    """Each message is a few hundred bytes, the whole is half a megabyte: bytes are no reason."""
+    """Each message is a few dozen bytes, the whole is thousands: bytes are no reason."""
     rng = np.random.default_rng(1)
-    starts = rng.uniform(-900, 900, (30_000, 2))
+    starts = rng.uniform(-900, 900, (1000, 2))
     segments = np.hstack([starts, starts + rng.uniform(0.5, 1.0, starts.shape)])
     lines = LineMap(segments, np.arange(len(segments)), np.ones(len(segments), dtype=np.int64))
     submap = Submap(0, 0, np.zeros(3), lines, Trajectory.empty())
@@ -183,7 +183,7 @@ def test_a_large_map_is_repeated_after_so_many_messages_however_little_changes()
         len(sender.payload(RobotMap("a", "b1", k, (replace(submap, pose=np.full(3, 1e-3 * k)),))))
         for k in range(1, MESSAGES_TO_COMPLETE + 2)
     ]
-    whole = [k for k, size in enumerate(sizes) if size > 1e5]
+    whole = [k for k, size in enumerate(sizes) if size > 1e3]
     assert whole == [0, MESSAGES_TO_COMPLETE]
 
 
