@@ -19,7 +19,7 @@ from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
 from tests.agent.test_agent import MAPWEAVE, PATIENCE, SCANS, Listener
 
-MILLIMETRE = 1.1e-3  # [m] what travels is rounded to
+HALF_A_STEP = 0.0126  # [m] of the poses of scans on the wire
 
 
 def scans_of(log: Path) -> list[Scan]:
@@ -47,7 +47,7 @@ def assert_mapped(robot_map: RobotMap, scans: list[Scan]) -> None:
     for submap, other in zip(robot_map.submaps, expected.submaps, strict=True):
         paths = submap.trajectory, other.trajectory
         np.testing.assert_array_equal(paths[0].scan_index, paths[1].scan_index)
-        np.testing.assert_allclose(paths[0].pose, paths[1].pose, atol=MILLIMETRE)
+        np.testing.assert_allclose(paths[0].pose, paths[1].pose, atol=HALF_A_STEP)
 
 
 def test_lines_on_standard_input_are_mapped_as_their_log_is(
