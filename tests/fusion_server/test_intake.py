@@ -13,8 +13,8 @@ from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.narration.story import Story
-from mapweave_protocol.wire import entropy
 from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.keys import MAP, STATUS
 from mapweave_protocol.wire.messages import StatusMessage
 

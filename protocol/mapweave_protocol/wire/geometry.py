@@ -10,11 +10,11 @@ import numpy as np
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap, Submap
-from mapweave_protocol.wire.entropy import Coder
-from mapweave_protocol.wire.free_space_code import CodedFreeSpace, code_free_space
-from mapweave_protocol.wire.line_code import CodedLines, code_lines, main_turn
+from mapweave_protocol.wire.coding.entropy import Coder
+from mapweave_protocol.wire.coding.free_space_code import CodedFreeSpace, code_free_space
+from mapweave_protocol.wire.coding.line_code import CodedLines, code_lines, main_turn
+from mapweave_protocol.wire.coding.trajectory_code import Clock, CodedTrajectory, code_trajectory
 from mapweave_protocol.wire.packing import whole_numbers
-from mapweave_protocol.wire.trajectory_code import Clock, CodedTrajectory, code_trajectory
 
 SUBMAP_REACH = 1e3  # [m] from a submap's origin; submaps are some 20 m across
 MAX_SUBMAPS = 4096  # of one robot: some 60 km of path

@@ -8,9 +8,9 @@ from pydantic import Field, model_validator
 
 from mapweave.maps import JointComponent, JointMap
 from mapweave_protocol.wire.alignment_message import WireAlignment
-from mapweave_protocol.wire.entropy import Decoder, Encoder
+from mapweave_protocol.wire.coding.entropy import Decoder, Encoder
+from mapweave_protocol.wire.coding.line_code import CERTAINTIES
 from mapweave_protocol.wire.geometry import MAX_BYTES, PackedLines
-from mapweave_protocol.wire.line_code import CERTAINTIES
 from mapweave_protocol.wire.model import (
     JOINT_REACH,
     MAX_ALIGNMENTS,

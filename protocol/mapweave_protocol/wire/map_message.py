@@ -13,7 +13,8 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import RobotMap, Submap
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.entropy import Coder, Decoder, Encoder
+from mapweave_protocol.wire.coding.entropy import Coder, Decoder, Encoder
+from mapweave_protocol.wire.coding.trajectory_code import Clock
 from mapweave_protocol.wire.geometry import (
     DIGEST_SIZE,
     MAX_BYTES,
@@ -22,7 +23,6 @@ from mapweave_protocol.wire.geometry import (
     digest_of,
 )
 from mapweave_protocol.wire.model import WORLD_REACH, Count, Id, Message
-from mapweave_protocol.wire.trajectory_code import Clock
 
 MAX_COMPONENT = 99_999
 

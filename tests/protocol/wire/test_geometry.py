@@ -17,8 +17,8 @@ from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire import geometry
 from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.coding.outlines import cut_open
 from mapweave_protocol.wire.messages import MapMessage
-from mapweave_protocol.wire.outlines import cut_open
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -16,7 +16,7 @@ import numpy as np
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.maps import LineMap
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.entropy import Coder
+from mapweave_protocol.wire.coding.entropy import Coder
 
 PER_METRE = 80  # a step of 12.5 mm: no point moves by more than 9 mm
 TURNS = 512  # directions of the frame told apart, in a quarter turn

@@ -13,8 +13,8 @@ import numpy as np
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.entropy import Coder
-from mapweave_protocol.wire.line_code import code_quarter, turned, turned_back
+from mapweave_protocol.wire.coding.entropy import Coder
+from mapweave_protocol.wire.coding.line_code import code_quarter, turned, turned_back
 
 PER_METRE = 4  # a step of 0.25 m: no corner moves by more than 0.18 m
 DEVIATION = 0.2  # [m] by which an outline is straightened before
@@ -41,7 +41,9 @@ class CodedFreeSpace:
         """
         if not rings:
             return cls(())
-        from mapweave_protocol.wire.outlines import straightened  # loads shapely: senders only
+        from mapweave_protocol.wire.coding.outlines import (
+            straightened,  # loads shapely: senders only
+        )
 
         packing.quantise(np.concatenate(rings), 1.0, reach)
         steps = [turned(ring, turn) * PER_METRE for ring in rings]
@@ -58,7 +60,7 @@ class CodedFreeSpace:
         rings: list[FloatArray] = []
         for outside, *holes in self.areas:
             if holes:
-                from mapweave_protocol.wire.outlines import cut_open  # loads shapely
+                from mapweave_protocol.wire.coding.outlines import cut_open  # loads shapely
 
                 rings += cut_open(outside, holes)
             else:

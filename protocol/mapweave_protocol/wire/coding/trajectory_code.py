@@ -14,8 +14,8 @@ import numpy as np
 from mapweave.geometry.arrays import IntArray
 from mapweave.maps import Trajectory
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.entropy import Coder
-from mapweave_protocol.wire.line_code import turned_back
+from mapweave_protocol.wire.coding.entropy import Coder
+from mapweave_protocol.wire.coding.line_code import turned_back
 
 PER_METRE = 40  # a step of 25 mm: no scan moves by more than 18 mm
 PER_TURN = 1024  # a step of 0.35°

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapweave_protocol.wire.entropy import (
+from mapweave_protocol.wire.coding.entropy import (
     MAX_BITS,
     NUMBERS_OF_A_BYTE,
     NUMBERS_OF_NONE,
