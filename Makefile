@@ -5,7 +5,7 @@ STAMP := .venv/.installed
 KERNELS := .venv/.kernels
 
 WHEEL_BIN := .venv-wheel/bin
-PACKAGES := mapweave protocol agent fusion_server deploy
+PACKAGES := mapweave protocol ros agent fusion_server deploy
 SOURCES := pyproject.toml README.md LICENSE \
 	$(shell find $(PACKAGES) -name __pycache__ -prune -o -print)
 # PYTHONSAFEPATH: programs that tests start import the wheel as well, not the checkout.
@@ -28,7 +28,7 @@ $(KERNELS): $(STAMP) mapweave/kernels/CMakeLists.txt $(wildcard mapweave/kernels
 	@touch $@
 
 demo: $(KERNELS)
-	$(BIN)/mapweave team --world office --robots 3 --output demo
+	$(BIN)/mapweave team --world office --robots 3 --output demo --http 127.0.0.1:0
 
 lint: $(KERNELS)
 	$(BIN)/ruff check .

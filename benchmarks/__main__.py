@@ -12,8 +12,10 @@ from benchmarks import (
     fit_confidence,
     fusion,
     kidnap,
+    live,
     mapping,
     mutations,
+    page,
     peers,
     reference,
     same_results,
@@ -39,6 +41,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "figure2": figure2,
     "map": mapping,
     "kidnap": kidnap,
+    "live": live,
     "endurance": endurance,
     "fusion": fusion,
     "reference": reference,
@@ -48,6 +51,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,
+    "page": page,
     "mutations": mutations,
 }
 USUAL = ("figure2", "map", "kidnap", "fusion")

@@ -38,7 +38,7 @@ from mapweave.matching.verification import Verdict
 
 MAX_BEND = 0.5  # [m] rms of the maps that the model is fitted to
 MOST_BENT = 0.07  # [m] off for each metre of reach that a right place may be
-NAMES = ("score", "held")  # of the slopes, as in `features`
+NAMES = ("score", "held", "overlap", "lead")  # of the slopes, as in `features`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +125,7 @@ def read_examples(file: Path) -> Examples:
     rows = [row for row in json.loads(file.read_text()) if row["evidence"]]
     verdicts = [_verdicts(row) for row in rows]
     return Examples(
-        np.array([features(best) for best, _ in verdicts]),
+        np.array([features(*pair) for pair in verdicts]),
         np.array([share(*pair, ConfidenceParameters()) for pair in verdicts]),
         np.array([_number(row["evidence"].get("reach")) for row in rows]),
         np.array([_number(row["distance"]) for row in rows]),

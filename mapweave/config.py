@@ -10,14 +10,12 @@ the defaults::
 The environment goes before the file, and the file before the defaults.
 """
 
-import json
 import math
 import reprlib
-import tomllib
 from collections import abc
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, Self, TypeAlias
 
 from annotated_types import Ge, Le
 from pydantic import (
@@ -31,6 +29,7 @@ from pydantic import (
 )
 from pydantic.fields import FieldInfo
 
+from mapweave.config_sources import Given, in_environment, in_file
 from mapweave.errors import ConfigError
 
 Value: TypeAlias = float | int | list[list[float]] | None
@@ -38,8 +37,6 @@ Value: TypeAlias = float | int | list[list[float]] | None
 
 DEFAULT = "default"
 """Where a value comes from that nobody set."""
-
-_PREFIX = "MAPWEAVE"
 
 
 class Unit(NamedTuple):
@@ -137,6 +134,17 @@ class Sensor(_Checked):
         description="scans a second, the fewest; unset: one, as in thinned logs",
     )
 
+    @model_validator(mode="after")
+    def _sees_something(self) -> Self:
+        if self.max_range is not None and self.range_min >= self.max_range:
+            raise ConfigError(
+                "",
+                "sensor.range_min",
+                f"expected less than max_range, {self.max_range:g} m, found {self.range_min:g}:"
+                " no reading would count",
+            )
+        return self
+
     @property
     def residual_sigma(self) -> float:
         """[m] of a point against the line it lies on: neighbouring returns err alike."""
@@ -214,7 +222,7 @@ class Config(_Checked):
 
     @classmethod
     def load(
-        cls, file: Path | None = None, environ: abc.Mapping[str, str] | None = None
+        cls, file: str | Path | None = None, environ: abc.Mapping[str, str] | None = None
     ) -> "Config":
         """Return what a file and the environment make of the defaults.
 
@@ -232,10 +240,10 @@ class Config(_Checked):
             If the file cannot be read, or something in it or in the environment is unknown, of
             the wrong type or out of bounds.
         """
-        given: dict[str, _Given] = {}
+        given: dict[str, Given] = {}
         if file is not None:
-            given.update(_in_file(file))
-        given.update(_in_environment(environ or {}))
+            given.update(in_file(Path(file), _sections()))
+        given.update(in_environment(environ or {}, _sections()))
         sections = {}
         for section, model in _sections().items():
             of_section = {k: v.value for k, v in given.items() if k.startswith(f"{section}.")}
@@ -270,54 +278,8 @@ class Config(_Checked):
         return hash((self.sensor, self.robot, self.mapping))
 
 
-class _Given(NamedTuple):
-    """What a file or a variable says, checked later; and which of them."""
-
-    value: object
-    origin: str
-
-
 def _sections() -> dict[str, type[_Checked]]:
     return {"sensor": Sensor, "robot": Robot, "mapping": Mapping}
-
-
-def _in_file(path: Path) -> Iterator[tuple[str, _Given]]:
-    """Yield what the file says, by names such as ``sensor.rate``."""
-    origin, known = str(path), ", ".join(_sections())
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(origin, "", f"cannot be read ({error.strerror})") from error
-    except (ValueError, RecursionError) as error:  # not UTF-8, or not TOML, or nested too deeply
-        raise ConfigError(origin, "", f"expected a file in TOML ({error})") from error
-    for section, table in content.items():
-        if section not in _sections():
-            raise ConfigError(origin, section, f"no such section; there are {known}")
-        if not isinstance(table, dict):
-            found = reprlib.repr(table)
-            raise ConfigError(origin, section, f"expected a table, [{section}], found {found}")
-        for name, value in table.items():
-            yield f"{section}.{name}", _Given(value, origin)
-
-
-def _in_environment(environ: abc.Mapping[str, str]) -> Iterator[tuple[str, _Given]]:
-    """Yield what variables say, by names such as ``sensor.rate``."""
-    for section in _sections():
-        prefix = f"{_PREFIX}_{section.upper()}_"
-        for variable in sorted(environ):
-            if variable.startswith(prefix) and environ[variable].strip():
-                name = variable.removeprefix(prefix).lower()
-                yield f"{section}.{name}", _Given(_number(environ[variable]), variable)
-
-
-def _number(text: str) -> object:
-    """Return the number, or the list of them, that `text` is; `text` itself where it is none."""
-    for kind in (json.loads,) if text.lstrip().startswith("[") else (int, float):
-        try:
-            return kind(text)
-        except (ValueError, RecursionError):
-            continue
-    return text
 
 
 def _first_problem(model: type[_Checked], error: ValidationError) -> ConfigError:

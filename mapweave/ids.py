@@ -21,6 +21,6 @@ def check_id(kind: str, name: str) -> str:
     InvalidIdError
         If it is not ``[a-z0-9][a-z0-9_-]{0,31}``.
     """
-    if not _ID.fullmatch(name):
+    if not (isinstance(name, str) and _ID.fullmatch(name)):
         raise InvalidIdError(kind, name)
     return name

@@ -22,6 +22,7 @@ class ReasonKind(StrEnum):
     PARALLEL = "parallel"  # not held along the walls
     STRAIGHT = "straight"  # no shape that tells places apart
     RIVAL = "rival"  # fits as well
+    ONE_ROOM = "one_room"  # all that is shared lies in one room, which may exist twice
     UNSURE = "unsure"
     CONVINCING = "convincing"
 
@@ -49,6 +50,7 @@ _NUMBERS: dict[ReasonKind, tuple[str, ...]] = {
     ReasonKind.PARALLEL: _MATCH,
     ReasonKind.STRAIGHT: _MATCH,
     ReasonKind.RIVAL: (*_MATCH, *_RIVAL),
+    ReasonKind.ONE_ROOM: (*_MATCH, "outside", "confidence"),
     ReasonKind.UNSURE: (*_MATCH, "confidence"),
     ReasonKind.CONVINCING: _MATCH,
     ReasonKind.PARTS_AGREE: ("parts", "spread"),

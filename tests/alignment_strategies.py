@@ -21,6 +21,7 @@ NEEDED: dict[ReasonKind, list[list[str]]] = {
     ReasonKind.PARALLEL: [MATCH],
     ReasonKind.STRAIGHT: [MATCH],
     ReasonKind.RIVAL: [MATCH + RIVAL],
+    ReasonKind.ONE_ROOM: [[*MATCH, "outside", "confidence"]],
     ReasonKind.UNSURE: [[*MATCH, "confidence"], [*MATCH, "confidence", *RIVAL]],
     ReasonKind.CONVINCING: [MATCH, MATCH + RIVAL],
     ReasonKind.REBASED: [[]],

@@ -12,6 +12,7 @@ import pytest
 PACKAGES = (
     "mapweave",
     "mapweave_protocol",
+    "mapweave_ros",
     "mapweave_agent",
     "mapweave_fusion_server",
     "mapweave_deploy",

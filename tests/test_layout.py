@@ -4,7 +4,7 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("mapweave", "protocol", "agent", "fusion_server", "deploy", "tools")
+PACKAGES = ("mapweave", "protocol", "ros", "agent", "fusion_server", "deploy", "tools")
 MOST = 16
 
 

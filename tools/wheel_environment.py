@@ -1,7 +1,7 @@
 """``python -m tools.wheel_environment FOLDER``: an environment that has mapweave as users get it.
 
-It holds the wheel in ``dist/`` and its dependencies, and what the tests need. The checkout comes
-last on its path: tests and benchmarks are found there, mapweave is not.
+It holds the wheel in ``dist/``, compiled for its Python, its dependencies, and what the tests need.
+The checkout comes last on its path: tests and benchmarks are found there, mapweave is not.
 """
 
 import argparse
@@ -15,6 +15,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
+FIND_TAG = "import sys; print('cp%d%d' % sys.version_info[:2])"
 FIND_SITE = "import sysconfig; print(sysconfig.get_path('purelib'))"
 
 
@@ -43,9 +44,10 @@ def make_environment(folder: Path, python: str, *, lowest: bool = False) -> Path
     Raises
     ------
     SystemExit
-        If there is not one wheel in ``dist/``, or it cannot be installed.
+        If there is not one wheel in ``dist/``, nor one source to make it of, or it cannot be
+        installed.
     """
-    wheel = _built_wheel()
+    wheel = _built_wheel(python)
     inside, stamp = folder / "bin" / "python", folder / ".made-of"
     made_of = sha256((ROOT / "pyproject.toml").read_bytes() + python.encode()).hexdigest()
     if not stamp.is_file() or stamp.read_text() != made_of:
@@ -71,11 +73,23 @@ def lowest_versions() -> Iterator[str]:
         yield f"{requirement.name}=={floors[0]}"
 
 
-def _built_wheel() -> Path:
-    wheels = list((ROOT / "dist").glob("*.whl"))
+def _built_wheel(python: str) -> Path:
+    """Return the wheel in ``dist/`` that `python` takes; one of another Python is compiled anew."""
+    told = subprocess.run([python, "-c", FIND_TAG], capture_output=True, text=True, check=True)
+    dist, tag = ROOT / "dist", told.stdout.strip()
+    sources = list(dist.glob("*.tar.gz"))
+    if not fitting_wheels(dist, tag) and len(sources) == 1:
+        compile_it = ("-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(dist))
+        _run(python, *compile_it, str(sources[0]))
+    wheels = fitting_wheels(dist, tag)
     if len(wheels) != 1:
-        raise SystemExit(f"dist/ has {len(wheels)} wheels, expected one: run make wheel")
+        raise SystemExit(f"dist/ has {len(wheels)} wheels of {tag}, expected one: run make wheel")
     return wheels[0]
+
+
+def fitting_wheels(folder: Path, tag: str) -> list[Path]:
+    """Return the wheels in `folder` for a Python, such as ``cp312``: its own, or any Python's."""
+    return [*folder.glob(f"*-{tag}-*.whl"), *folder.glob("*-py3-*.whl")]
 
 
 def _append_checkout(python: Path) -> None:

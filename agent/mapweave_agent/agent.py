@@ -1,8 +1,10 @@
 """A robot: its scans become its map, its map and its peers' maps become alignments."""
 
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import zenoh
@@ -14,7 +16,8 @@ from mapweave.team.hysteresis import keep_joined
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
-from mapweave_agent.live_scans import LiveScans
+from mapweave_agent.live.scans import LiveScans
+from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
 from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
@@ -32,14 +35,15 @@ from mapweave_protocol.wire.keys import (
     MAP,
     STATUS,
 )
-from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
+from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
-LIVE_POLL = 0.02  # [s] after which what arrived is attended to while no scan comes
+LIVE_POLL = 0.05  # [s] after which it is noticed that no scans come, or nothing arrives
 MAX_ARRIVALS = 64  # taken in at once, so that a flood does not hold up mapping
 
 _log = logging.getLogger(__name__)
 Stopping = Callable[[], bool]
+Tell = Callable[[RobotMap | PoseMessage], None]
 
 
 class AgentRun:
@@ -63,6 +67,8 @@ class AgentRun:
         The robot's earlier runs that belong to the team's map, the earliest first.
     first
         The number of this run's first component, above those of all runs before it.
+    tell
+        Told each map and pose that is published, in whatever thread; it must return at once.
     """
 
     def __init__(
@@ -76,6 +82,7 @@ class AgentRun:
         state: StateFolder,
         past: Sequence[PastRun] = (),
         first: int = 0,
+        tell: Tell = lambda _: None,
     ) -> None:
         self._session = session
         self._team = team
@@ -86,14 +93,20 @@ class AgentRun:
         self._state = state
         self._past = {run.state: run for run in past}
         self._first = first
+        self._tell = tell
         self._publication = PublicationSchedule(parameters.map_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
         if past:
             self._comparisons.earlier_map(past[-1].map)
         self._needs = Needs(mapper.robot)
-        self._reception = Dispatcher(mapper.robot, mapper.boot, self._comparisons, self._needs)
+        self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
+        self._reception = Dispatcher(
+            mapper.robot, mapper.boot, self._comparisons, self._needs, self._whereabouts
+        )
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
         self._inbox = Inbox()
+        self._mapping = threading.Lock()
+        self._live: LiveScans | None = None
         self._published: RobotMap = mapper.robot_map()
         self._scans_seen = 0
         self._changed = False
@@ -125,13 +138,31 @@ class AgentRun:
         MapweaveError
             If where the scans come from fails.
         """
+        self._live = scans
         with self._in_the_team():
-            while not (stopping() or scans.ended):
-                scan = scans.take(LIVE_POLL)
-                if scan is not None:
-                    self._map(scan)
-                self._attend(0.0)
+            with self._attending() as failed:
+                while not (stopping() or scans.ended or failed()):
+                    scan = scans.take(LIVE_POLL)
+                    if scan is not None:
+                        self._map(scan)
             self._compare_until(stopping)
+
+    @contextmanager
+    def _attending(self) -> Iterator[Callable[[], bool]]:
+        """Do all but mapping in a thread of its own; give a block what tells that it failed."""
+        over = threading.Event()
+
+        def attend() -> None:
+            while not over.is_set():
+                self._attend(LIVE_POLL)
+
+        with ThreadPoolExecutor(1, thread_name_prefix="attending") as thread:
+            attended = thread.submit(attend)
+            try:
+                yield attended.done
+            finally:
+                over.set()
+            attended.result()
 
     @contextmanager
     def _in_the_team(self) -> Iterator[None]:
@@ -159,7 +190,12 @@ class AgentRun:
             self._map(scan)
 
     def _map(self, scan: Scan) -> None:
-        placement = self._mapper.add(scan)
+        with self._mapping:
+            placement = self._mapper.add(scan)
+        pose = self._whereabouts.message(scan, placement, time.time())
+        if pose is not None:
+            self._outbox.send_pose(pose)
+            self._tell(pose)
         self._scans_seen += 1
         self._changed |= placement.placed
         if placement.submap_finished or placement.lost:
@@ -241,13 +277,17 @@ class AgentRun:
         return found
 
     def _publish_map(self, *, complete: bool) -> None:
-        mapped = without_strays(self._mapper.robot_map())
-        self._published = numbered_from(mapped, self._first)
-        self._outbox.send_map(self._published, complete=complete)
-        self._state.keep(self._published)
-        self._comparisons.own_map(self._published, finished=self._finished)
-        self._publication.published(time.monotonic())
         self._changed = False
+        with self._mapping:
+            snapshot = self._mapper.snapshot()
+        mapped = without_strays(snapshot.robot_map())
+        self._published = numbered_from(mapped, self._first)
+        arrives = self._outbox.send_map(self._published, complete=complete)
+        self._tell(self._published)
+        self._state.keep(self._published)
+        # Peers compare what has arrived: so do we, that it is decided alike on both ends.
+        self._comparisons.own_map(arrives, finished=self._finished)
+        self._publication.published(time.monotonic())
 
     def _publish_status(self) -> None:
         status = StatusMessage(
@@ -258,6 +298,8 @@ class AgentRun:
             scans_seen=self._scans_seen,
             scans_placed=_scans_placed(self._published),
             scans_total=self._total,
+            scans_skipped=0 if self._live is None else self._live.skipped,
+            scan_age=None if self._live is None else self._live.oldest(),
             components=len(self._published.components),
             submaps=len(self._published.submaps),
             map_version=self._published.version,

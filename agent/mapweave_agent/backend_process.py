@@ -34,6 +34,11 @@ class BackendProcess(Worker):
         except (BrokenPipeError, ConnectionResetError):
             self._tell_end()
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether the outcome is there, or there will be none."""
+        return self._ended or self._pipe.poll()
+
     def take(self) -> BackendResult | None:
         """Wait for the outcome; None where there is nobody to come to one."""
         if self._ended:

@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import math
 import sys
 from functools import partial
 from pathlib import Path
@@ -23,7 +24,8 @@ from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
-from mapweave_agent.live_scans import scans_of
+from mapweave_agent.live.ros2_output import output_of
+from mapweave_agent.live.scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.source import ReplayClock, count_selected, parse_rate, told_once
 from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
@@ -42,7 +44,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         "--source",
         metavar="SOURCE",
         help="where the scans come from: a log or a bag to play, - for lines of JSON on standard"
-        " input, or what an installed package brings",
+        " input, ros2:/scan for a ROS 2 topic on Zenoh, or what an installed package brings",
     )
     sources.add_argument(
         "--log", dest="source", metavar="LOG", help="the laser log to play, as --source"
@@ -53,7 +55,8 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         type=argument(parse_rate),
         default="1",
         metavar="X",
-        help="how many times real time the log is played, or max (default 1)",
+        help="how many times real time a recording is played, or max (default 1); with max no scan"
+        " of a live source is skipped either",
     )
     parser.add_argument(
         "--scans",
@@ -68,6 +71,12 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         default=AgentParameters().map_interval,
         metavar="S",
         help="least time between two messages of the growing submap [s] (default %(default)g)",
+    )
+    parser.add_argument(
+        "--publish",
+        metavar="NETWORK",
+        help="show the robot's map and pose on a ROS 2 network as well: ros2: for the team's, or"
+        " such as 'ros2:?connect=tcp/127.0.0.1:7447&domain=0'",
     )
     parser.add_argument(
         "--state",
@@ -95,8 +104,9 @@ def _run(options: argparse.Namespace) -> int:
     config = config_of(options)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
     step, warn = config.sensor.angular_step, told_once(_log.warning)
-    source = open_source(options.source, ReadOptions(False, step, options.topic, warn))
+    source = open_source(options.source, ReadOptions(False, step, options.topic, warn, endpoints))
     total = count_selected(options.source, source, options.scans)
+    output = output_of(options.publish, robot, endpoints, source)
     earlier = EarlierRuns.of(team, robot, options.state)
 
     def tell_waiting() -> None:
@@ -105,16 +115,20 @@ def _run(options: argparse.Namespace) -> int:
     mapping = MapperParameters.of(config)
     compare = partial(align, parameters=FusionParameters.of(config))
     with (
+        output as tell,
         ComparisonWorker(compare) as comparer,
         BackendProcess(mapping.backend) as backend,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        mapper = Mapper(robot, new_boot(), mapping, backend, config)
+        live = source.live and not math.isinf(options.rate)
+        mapper = Mapper(
+            robot, new_boot(), mapping, backend, config, live=live, on_warning=_log.warning
+        )
         parameters = AgentParameters(map_interval=options.map_interval)
         past = earlier.young(options.resume_within)
         first = earlier.first_component(session, team, robot)
         run = AgentRun(
-            session, team, mapper, comparer, total, parameters, earlier.folder, past, first
+            session, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
         )
         _run_on(source, run, options)
     return 0
@@ -124,7 +138,8 @@ def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> N
     """Run on the scans chosen: a recording is played at a rate, others come when they come."""
     stopping = stop_on_signal()
     if source.live:
-        with scans_of(source, options.scans) as scans:
+        skipping = not math.isinf(options.rate)
+        with scans_of(source, options.scans, skipping=skipping) as scans:
             run.run_live(scans, stopping)
     else:
         run.run(options.scans.of(source.scans()), ReplayClock(options.rate), stopping)

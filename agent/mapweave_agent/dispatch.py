@@ -3,6 +3,7 @@
 import logging
 
 from mapweave_agent.comparison_schedule import ComparisonSchedule
+from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
@@ -31,12 +32,22 @@ class Dispatcher:
         Told what is news.
     needs
         Told what others hold.
+    whereabouts
+        Told which frames the joint map has.
     """
 
-    def __init__(self, robot: str, boot: str, plan: ComparisonSchedule, needs: Needs) -> None:
+    def __init__(
+        self,
+        robot: str,
+        boot: str,
+        plan: ComparisonSchedule,
+        needs: Needs,
+        whereabouts: Whereabouts,
+    ) -> None:
         self._robot = robot
         self._plan = plan
         self._needs = needs
+        self._whereabouts = whereabouts
         self._maps = map_reader()
         self._statuses = status_reader()
         self._alignments = alignment_reader()
@@ -87,6 +98,7 @@ class Dispatcher:
         status = self._joint_statuses.read(arrival)
         if status is not None:
             self._needs.coordinator(status)
+            self._whereabouts.coordinator(status)
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)

@@ -15,13 +15,15 @@ from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import (
     declare_alignment_publisher,
     declare_map_publisher,
+    declare_pose_publisher,
     declare_status_publisher,
 )
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, STATUS
-from mapweave_protocol.wire.messages import AlignmentMessage, StatusMessage, Traffic
+from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, POSE, STATUS
+from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage, StatusMessage, Traffic
 
 WAITING_QUERIES = 16
+KINDS = "map", "alignment", "pose", "status"
 
 _log = logging.getLogger(__name__)
 
@@ -43,8 +45,8 @@ class Outbox:
         self._sender = MapSender()
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[tuple[str, str], AlignmentMessage] = {}
-        self._messages: Counter[str] = Counter()
-        self._bytes: Counter[str] = Counter()
+        self._messages = Counter(dict.fromkeys(KINDS, 0))
+        self._bytes = Counter(dict.fromkeys(KINDS, 0))
         self._declared = ExitStack()
 
     def __enter__(self) -> "Outbox":
@@ -55,6 +57,8 @@ class Outbox:
             status_key = STATUS.build(team=self._team, robot=self._robot)
             live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
             self._maps = keep(declare_map_publisher(self._session, map_key))
+            pose_key = POSE.build(team=self._team, robot=self._robot)
+            self._poses = keep(declare_pose_publisher(self._session, pose_key))
             self._statuses = keep(declare_status_publisher(self._session, status_key))
             questions: zenoh.handlers.RingChannel[zenoh.Query]
             questions = zenoh.handlers.RingChannel(WAITING_QUERIES)
@@ -78,6 +82,7 @@ class Outbox:
         return {
             kind: Traffic(messages=count, bytes=self._bytes[kind])
             for kind, count in self._messages.items()
+            if count
         }
 
     @property
@@ -85,9 +90,10 @@ class Outbox:
         """What was published last of each pair of robots."""
         return self._found.values()
 
-    def send_map(self, robot_map: RobotMap, *, complete: bool) -> None:
-        """Publish a version of the map, or all of it if `complete`."""
+    def send_map(self, robot_map: RobotMap, *, complete: bool) -> RobotMap:
+        """Publish a version of the map, or all of it if `complete`; return it as it arrives."""
         self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
+        return self._sender.as_sent(robot_map)
 
     def send_past(self, run: PastRun) -> None:
         """Publish the map of an earlier run."""
@@ -106,6 +112,10 @@ class Outbox:
     def send_status(self, message: StatusMessage) -> None:
         """Publish how far the robot is."""
         self._put("status", self._statuses, encode(message))
+
+    def send_pose(self, message: PoseMessage) -> None:
+        """Publish where the robot is."""
+        self._put("pose", self._poses, encode(message))
 
     def answer(self, robot_map: RobotMap) -> None:
         """Give who has asked the whole of `robot_map`, as published last, and what was found."""

@@ -2,12 +2,12 @@
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -20,13 +20,16 @@ from mapweave.scan.scan import Scan
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
-from mapweave_agent.live_scans import LiveScans
+from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
 from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import open_session
-from mapweave_protocol.link.subscriber import joint_maps
+from mapweave_protocol.link.subscriber import joint_maps, poses
 from mapweave_protocol.wire.keys import new_boot
+from mapweave_protocol.wire.messages import PoseMessage
+
+T = TypeVar("T")
 
 
 class Agent:
@@ -46,6 +49,9 @@ class Agent:
         Sensor, robot and numbers of mapping.
     on_joint_map
         Called with each version of the team's joint map, in a thread of its own.
+    on_pose
+        Called with where each robot of the team is, this one included, at the rate of its scans,
+        in a thread of its own; where it takes longer, with the newest of each.
     patience
         How long the router is tried [s]; None for as long as it takes.
     state
@@ -73,6 +79,7 @@ class Agent:
         connect: str | Sequence[str] | None = None,
         config: Config | None = None,
         on_joint_map: Callable[[JointMap], None] | None = None,
+        on_pose: Callable[[PoseMessage], None] | None = None,
         patience: float | None = None,
         state: str | Path | None = None,
     ) -> None:
@@ -81,6 +88,7 @@ class Agent:
         self._endpoints = (connect,) if isinstance(connect, str) else connect
         self._config = Config() if config is None else config
         self._on_joint_map = on_joint_map
+        self._on_pose = on_pose
         self._patience = patience
         self._state = None if state is None else Path(state)
         self._scans = LiveScans()
@@ -143,9 +151,8 @@ class Agent:
             run = self._open(stack)
             self._opened = stack.pop_all()
         self._threads = [threading.Thread(target=self._map, args=(run,), name=self._robot)]
-        if self._on_joint_map is not None:
-            listen = partial(self._listen, self._on_joint_map)
-            self._threads.append(threading.Thread(target=listen, name="joint maps"))
+        for listen in self._listeners():
+            self._threads.append(threading.Thread(target=listen))
         for thread in self._threads:
             thread.start()
         return self
@@ -173,7 +180,7 @@ class Agent:
         session = stack.enter_context(open_session(self._endpoints, patience=self._patience))
         comparer = stack.enter_context(ComparisonWorker(compare))
         backend = stack.enter_context(BackendProcess(mapping.backend))
-        mapper = Mapper(self._robot, new_boot(), mapping, backend, self._config)
+        mapper = Mapper(self._robot, new_boot(), mapping, backend, self._config, live=True)
         return AgentRun(
             session,
             self._team,
@@ -195,10 +202,16 @@ class Agent:
         finally:
             self._leaving.set()
 
-    def _listen(self, on_joint_map: Callable[[JointMap], None]) -> None:
-        """Tell the program of each version, until it leaves."""
-        for joint in joint_maps(self._team, connect=self._endpoints, stopping=self._leaving.is_set):
-            on_joint_map(joint)
+    def _listeners(self) -> Iterator[Callable[[], None]]:
+        """Yield what tells the program what it asked for, until it leaves."""
+        if self._on_joint_map is not None:
+            yield partial(self._listen, joint_maps, self._on_joint_map)
+        if self._on_pose is not None:
+            yield partial(self._listen, poses, self._on_pose)
+
+    def _listen(self, subscribe: Callable[..., Iterator[T]], tell: Callable[[T], None]) -> None:
+        for heard in subscribe(self._team, connect=self._endpoints, stopping=self._leaving.is_set):
+            tell(heard)
 
     def _check_running(self) -> None:
         if self._failure is not None:

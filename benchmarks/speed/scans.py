@@ -15,7 +15,8 @@ from benchmarks.logs import find_logs
 from benchmarks.speed.rows import Report, Row, timed
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.readers import read_scans
-from mapweave.mapping.mapper import Mapper, Placement
+from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.placement import Placement
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.maps import RobotMap

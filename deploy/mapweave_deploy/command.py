@@ -2,6 +2,7 @@
 
 import argparse
 import signal
+import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -19,11 +20,20 @@ from mapweave.io.map_files import write_joint
 from mapweave.maps import MadeWith
 from mapweave.pictures.picture import draw_joint
 from mapweave_deploy.run.display import open_display
-from mapweave_deploy.run.launcher import Plan, TeamOutcome, free_endpoint, run_team, start_server
+from mapweave_deploy.run.launcher import (
+    Plan,
+    TeamOutcome,
+    free_endpoint,
+    run_team,
+    start_server,
+    with_free_port,
+)
 from mapweave_deploy.run.options import check_source, configure
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.report import tell_files, tell_outcome, tell_verdicts
 from mapweave_deploy.run.team_plan import Member, simulated_team, team_from_logs
+from mapweave_fusion_server.web.address import new_token
+from mapweave_fusion_server.web.loading import live_page
 from mapweave_protocol.link.stopping import stop_on_signal
 
 NAP = 0.2  # [s]
@@ -81,6 +91,8 @@ def run(options: argparse.Namespace) -> int:
     check_source(options)
     check_id("team", options.team)
     config = config_of(options)
+    if options.http is not None:
+        live_page()  # told now where a package is missing, not by a process that ends
     # Whoever terminates a team means all of it, as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     console = Console()
@@ -94,7 +106,7 @@ def run(options: argparse.Namespace) -> int:
         ProcessGroup(folder.logs) as crew,
     ):
         plan = _plan(options, folder, options.store or new, Path(states))
-        _say(console, [_how_to_watch(plan)])
+        _say(console, _how_to_watch(plan))
         with open_display(console, plan.members) as display:
             outcome = run_team(crew, plan, display)
         store = _keep_store(plan.store, options.store or folder.store)
@@ -104,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
         _say(console, tell_files([*files, ("what each process said", folder.logs)]))
         simulated = options.world is not None
         _say(console, tell_verdicts(outcome, plan.members, simulated=simulated))
-        if options.stay:
+        if options.stay or (plan.page is not None and _is_attended(console)):
             _stay(crew, plan, store, console)
     return 0
 
@@ -119,6 +131,8 @@ def _plan(options: argparse.Namespace, folder: Folder, store: Path, states: Path
         timeout=options.timeout,
         config=options.config,
         states=states,
+        page=None if options.http is None else with_free_port(options.http),
+        token=new_token(),
     )
 
 
@@ -140,8 +154,11 @@ def _unfinished_store(final: Path) -> Iterator[Path]:
 
 
 def _remove_store(path: Path) -> None:
-    """Remove what there is of a store, with the files SQLite keeps beside it."""
-    for end in ("", "-wal", "-shm"):
+    """Remove what there is of a store, with the files SQLite keeps beside it.
+
+    A coordinator that is ended while it makes its store leaves the journal of that.
+    """
+    for end in ("", "-wal", "-shm", "-journal"):
         path.with_name(path.name + end).unlink(missing_ok=True)
 
 
@@ -161,15 +178,23 @@ def _source(options: argparse.Namespace) -> str:
     return f"{options.robots} robots for each of: {', '.join(str(log) for log in options.logs)}"
 
 
-def _how_to_watch(plan: Plan) -> str:
-    return f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}"
+def _how_to_watch(plan: Plan) -> Iterator[str]:
+    yield f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}"
+    if plan.page is not None:
+        yield f"Live page: {plan.page.url(plan.token)}"
+
+
+def _is_attended(console: Console) -> bool:
+    """Tell whether a person is there who can end it."""
+    return console.is_terminal and sys.stdin.isatty()
 
 
 def _stay(crew: ProcessGroup, plan: Plan, store: Path, console: Console) -> None:
     """Serve what was stored until Ctrl-C, which is the way to end this."""
     stopping = stop_on_signal()
     start_server(crew, plan, store)
-    _say(console, ["Router and coordinator stay; Ctrl-C ends them."])
+    page = [] if plan.page is None else [f"Live page: {plan.page.url(plan.token)}"]
+    _say(console, [*page, "Router and coordinator stay; Ctrl-C ends them."])
     while not stopping():
         crew.check()
         time.sleep(NAP)

@@ -7,8 +7,9 @@ from types import TracebackType
 
 from mapweave.config import Config
 from mapweave.maps import JointMap
-from mapweave.team.joint_map import JointParameters
-from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
+from mapweave.team.joining import JointParameters
+from mapweave.team.joint_builder import JointMapBuilder
+from mapweave.team.joint_optimization import JointOptimizationParameters
 from mapweave_fusion_server.coordinator import Draft
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import JointMapMessage
@@ -51,9 +52,10 @@ class VersionBuilder:
 
     def __init__(self, series: str, config: Config) -> None:
         self._series = series
-        self._parameters = JointParameters.of(config)
         # The worker's alone.
-        self._weaver = JointOptimizer(JointOptimizationParameters.of(config))
+        self._builder = JointMapBuilder(
+            JointParameters.of(config), JointOptimizationParameters.of(config)
+        )
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
         self._future: Future[Built] | None = None
 
@@ -98,5 +100,5 @@ class VersionBuilder:
         return future.result()
 
     def _build(self, draft: Draft, begun: float) -> Built:
-        joint = draft.build(self._weaver, self._parameters)
+        joint = draft.build(self._builder)
         return Built(draft, begun, joint, encode(JointMapMessage.pack(joint, self._series)))

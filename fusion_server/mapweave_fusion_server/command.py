@@ -2,13 +2,25 @@
 
 import argparse
 import logging
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from mapweave.cli import Command, add_config_argument, argument, config_of, not_negative
+from mapweave.config import Config
 from mapweave_fusion_server.coordinator import CoordinatorParameters
 from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.address import (
+    TOKEN_VARIABLE,
+    HttpAddress,
+    loopback_address,
+    new_token,
+)
+from mapweave_fusion_server.web.feed import Feed
+from mapweave_fusion_server.web.loading import live_page
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
@@ -26,6 +38,12 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="what is remembered; numbering goes on from there (default mapweave-TEAM.sqlite)",
+    )
+    parser.add_argument(
+        "--http",
+        type=argument(loopback_address),
+        metavar="HOST:PORT",
+        help="serve the live page there, such as 127.0.0.1:8080: on this machine only",
     )
     parser.add_argument(
         "--min-interval",
@@ -51,10 +69,25 @@ def _run(options: argparse.Namespace) -> int:
 
     with (
         Store(path, team) as store,
+        _page(options.http, team, store, config) as feed,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        Service(session, team, store, parameters, config).run(stop_on_signal())
+        Service(session, team, store, parameters, config, feed).run(stop_on_signal())
     return 0
+
+
+@contextmanager
+def _page(
+    address: HttpAddress | None, team: str, store: Store, config: Config
+) -> Iterator[Feed | None]:
+    """Serve the live page in the block, where an address is given; give what feeds it."""
+    if address is None:
+        yield None
+        return
+    feed, token = Feed(), os.environ.get(TOKEN_VARIABLE) or new_token()
+    with live_page()(address, team, store, config, feed, token) as bound:
+        _log.info("live page: %s", bound.url(token))
+        yield feed
 
 
 command = Command("Coordinate a team: maps and alignments in, joint maps out.", _configure, _run)

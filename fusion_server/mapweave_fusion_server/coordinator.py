@@ -7,12 +7,12 @@ import math
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name, parse_component
-from mapweave.team.joint_map import JointParameters, build_team_map
-from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
 from mapweave.team.revocation import mark_revoked
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
@@ -20,6 +20,10 @@ from mapweave_protocol.wire.pairs import Run, is_older, states_of
 
 MAX_RUNS = 64  # of a robot: a new battery every hour for a week of days
 REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
+
+
+# A message, the maps that it is carried over to, and the alignments that come of it.
+_CarriedOver: TypeAlias = tuple[AlignmentMessage, tuple[RobotMap, ...], tuple[Alignment, ...]]
 
 
 class CoordinatorParameters(BaseModel):
@@ -62,17 +66,15 @@ class Draft:
     alignments: tuple[Alignment, ...]
     before: tuple[Alignment, ...] = ()
 
-    def build(self, weaver: JointOptimizer, parameters: JointParameters | None = None) -> JointMap:
+    def build(self, builder: JointMapBuilder) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
 
         Parameters
         ----------
-        weaver
-            Remembers, from one version to the next, which submaps fit.
-        parameters
-            Of how maps become one.
+        builder
+            Keeps what it made for the versions before.
         """
-        joint = build_team_map(self.maps, self.alignments, self.version, weaver, parameters)
+        joint = builder.build(self.maps, self.alignments, self.version)
         return mark_revoked(joint, self.before)
 
 
@@ -95,6 +97,7 @@ class Coordinator:
         self._maps: dict[Run, RobotMap] = {}
         self._states: dict[Run, dict[int, dict[int, SubmapPlace]]] = {}
         self._alignments: dict[frozenset[Run], AlignmentMessage] = {}
+        self._carried: dict[frozenset[Run], _CarriedOver] = {}
         self._urgency = Urgency.NONE
         self._draft: Draft | None = None
         self._begun = -math.inf
@@ -113,6 +116,11 @@ class Coordinator:
     def maps_held(self) -> tuple[MapVersion, ...]:
         """Which state of the map of each run of each robot is here."""
         return tuple(MapVersion.of(self._maps[run]) for run in sorted(self._maps))
+
+    @property
+    def maps(self) -> tuple[RobotMap, ...]:
+        """The maps of all runs of all robots."""
+        return tuple(sorted(self._maps.values(), key=lambda m: (m.robot, min(m.components))))
 
     @property
     def alignments_held(self) -> tuple[tuple[MapVersion, MapVersion], ...]:
@@ -193,9 +201,8 @@ class Coordinator:
         """Return the draft of the next version, made of all that is known; `finish` must follow."""
         if self._draft is not None:
             raise RuntimeError("the last draft is not finished")
-        maps = tuple(sorted(self._maps.values(), key=lambda m: (m.robot, min(m.components))))
         alignments = tuple(self._alignments_in_force())
-        self._draft = Draft(self._version + 1, maps, alignments, self._judged)
+        self._draft = Draft(self._version + 1, self.maps, alignments, self._judged)
         self._begun, self._urgency = now, Urgency.NONE
         return self._draft
 
@@ -214,13 +221,27 @@ class Coordinator:
         }
         for message in self._alignments.values():
             if self._maps.keys() >= states_of(_ends(message)).keys():
-                first, second = (self._change(end) for end in _ends(message))
-                for alignment in message.unpack():
+                for alignment in self._carried_over(message):
                     if {alignment.reference, alignment.other} <= existing:
-                        robot, _ = parse_component(alignment.reference)
-                        straight = robot == message.reference.robot
-                        ours, theirs = (first, second) if straight else (second, first)
-                        yield carry(alignment, ours, theirs)
+                        yield alignment
+
+    def _carried_over(self, message: AlignmentMessage) -> tuple[Alignment, ...]:
+        """Return the alignments of `message` for the maps as they are; kept until these change."""
+        runs = frozenset(states_of(_ends(message)))
+        states = tuple(self._maps[_run(end)] for end in _ends(message))
+        kept = self._carried.get(runs)
+        if kept is None or kept[:2] != (message, states):
+            kept = message, states, tuple(self._carry(message))
+            self._carried[runs] = kept
+        return kept[2]
+
+    def _carry(self, message: AlignmentMessage) -> Iterator[Alignment]:
+        first, second = (self._change(end) for end in _ends(message))
+        for alignment in message.unpack():
+            robot, _ = parse_component(alignment.reference)
+            straight = robot == message.reference.robot
+            ours, theirs = (first, second) if straight else (second, first)
+            yield carry(alignment, ours, theirs)
 
     def _runs_of(self, robot: str) -> list[RobotMap]:
         return [robot_map for run, robot_map in self._maps.items() if run[0] == robot]

@@ -12,6 +12,7 @@ from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, pair_of
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.feed import RobotReport
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import (
@@ -70,6 +71,7 @@ class Intake:
         self._alignments = alignment_reader()
         self._statuses = status_reader()
         self._heard: dict[Run, StatusMessage] = {}
+        self._last_heard: dict[str, float] = {}
         self._lacking = Lacking()
         self._assembler = MapAssembler()
         self._clashing: set[str] = set()
@@ -80,6 +82,20 @@ class Intake:
     def refused(self) -> int:
         """How many messages were dropped because they were not what they should be."""
         return self._maps.refused + self._alignments.refused + self._statuses.refused
+
+    @property
+    def reports(self) -> tuple[RobotReport, ...]:
+        """How each robot is, as far as it was heard of."""
+        return tuple(
+            RobotReport(
+                robot,
+                runs=len(state.claimants.boots),
+                status=state.status,
+                heard=self._last_heard.get(robot),
+                map_version=self._held_version(robot),
+            )
+            for robot, state in self._story.robots.items()
+        )
 
     def restore(self) -> None:
         """Take up what the store remembers; what the last version was made of is no news.
@@ -115,11 +131,17 @@ class Intake:
             status = self._statuses.read(arrival)
             if status is not None and self._hears({status.robot}):
                 self._heard[status.robot, status.boot] = status
+                self._last_heard[status.robot] = received
+                record(self._story.status(status))
         elif (coordinator := read_coordinator(arrival)) is not None:
             boot, here = coordinator
             record(self._story.coordinator(boot, here=here))
         elif LIVE.matches(arrival.key):
             self._take_presence(arrival)
+
+    def _held_version(self, robot: str) -> int | None:
+        held = self._coordinator.map_of(robot)
+        return None if held is None else held.version
 
     def robots_to_ask(self, now: float) -> list[str]:
         """Return those whose map, by what they have said, has not arrived; `now` [s], any clock."""

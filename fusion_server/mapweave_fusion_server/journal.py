@@ -3,10 +3,10 @@
 import logging
 from collections.abc import Iterable
 
-_log = logging.getLogger(__name__)
+LOGGER = logging.getLogger(__name__)
 
 
 def record(lines: Iterable[str]) -> None:
     """Log `lines`; what came from the network cannot move a terminal's cursor."""
     for line in lines:
-        _log.info("%s", "".join(c if c.isprintable() else "?" for c in line))
+        LOGGER.info("%s", "".join(c if c.isprintable() else "?" for c in line))

@@ -16,6 +16,7 @@ from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameter
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_protocol.link import session
 from mapweave_protocol.link.asking import request_all_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
@@ -23,6 +24,7 @@ from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.joint_status_message import frames_of
 from mapweave_protocol.wire.messages import JointStatusMessage
 
 POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
@@ -48,6 +50,8 @@ class Service:
         Of the coordinator.
     config
         Of how maps become one; the default one where none is given.
+    feed
+        Is handed every version, and every second how robots and coordinator are.
 
     Raises
     ------
@@ -62,18 +66,24 @@ class Service:
         store: Store,
         parameters: CoordinatorParameters,
         config: Config | None = None,
+        feed: Feed | None = None,
     ) -> None:
         self._session = zenoh_session
         self._team = team
         self._store = store
         self._story = Story()
-        self._coordinator = Coordinator(parameters, last_version(store))
+        latest = last_version(store)
+        self._frames = frames_of(latest)
+        self._coordinator = Coordinator(parameters, latest)
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
         self._boot = keys.new_boot()
         self._status_due = 0.0
         self._builder = VersionBuilder(store.series, config or Config())
+        self._started = time.time()
+        self._feed = feed or Feed()
+        self._feed.show_version(store.latest_version, self._coordinator.maps)
 
     def run(self, stopping: Callable[[], bool]) -> None:
         """Serve until `stopping`; then publish what is pending.
@@ -130,6 +140,9 @@ class Service:
             # Stored first: what was published once must be there after a crash.
             self._store.add_version(built.draft.version, built.begun, built.payload)
             self._publisher.put(built.payload)
+            self._frames = frames_of(built.joint)
+            self._status_due = 0.0  # robots wait for their new frames
+            self._feed.show_version(built.draft.version, built.draft.maps)
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
 
@@ -149,8 +162,19 @@ class Service:
             pending=self._coordinator.is_pending,
             maps=self._coordinator.maps_held,
             alignments=self._coordinator.alignments_held,
+            frames=self._frames,
         )
         self._statuses.put(encode(status))
+        self._feed.show_team(
+            self._intake.reports,
+            CoordinatorReport(
+                boot=self._boot,
+                started=self._started,
+                stamp=status.stamp,
+                pending=status.pending,
+                refused=self._intake.refused,
+            ),
+        )
 
     @contextmanager
     def _announced(self) -> Iterator[None]:

@@ -16,7 +16,7 @@ from typing import Any
 from mapweave.errors import FileError
 
 APPLICATION_ID = 0x4D505756  # "MPWV", in the file's header (SQLite file format, 1.3.17)
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3  # rises with the wire's: messages are kept as they travelled
 _HEADER_LENGTH = 100
 _MAGIC = b"SQLite format 3\0"
 
@@ -110,6 +110,11 @@ class Store:
     def version(self, number: int) -> bytes | None:
         """Return the message of version `number`, None when there is none."""
         return self._blob("SELECT message FROM version WHERE number = ?", number)
+
+    def versions_created(self, since: int, limit: int) -> list[tuple[int, float]]:
+        """Return number and time [s since 1970] of at most `limit` versions after `since`."""
+        sql = "SELECT number, created FROM version WHERE number > ? ORDER BY number LIMIT ?"
+        return [(int(number), float(t)) for number, t in self._rows(sql, since, limit)]
 
     def versions_since(self, number: int) -> Iterator[bytes]:
         """Yield the messages of all versions after `number`, oldest first, one at a time."""

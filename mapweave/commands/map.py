@@ -76,7 +76,7 @@ def _map_all(
     options: argparse.Namespace, source: ScanSource, config: Config
 ) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
-    mapper = Mapper(options.robot, config=config)
+    mapper = Mapper(options.robot, config=config, on_warning=_warn)
     scans = source.count() if sys.stderr.isatty() else None
     total = None if scans is None else options.scans.count(scans)
     name = Path(options.log).name

@@ -8,24 +8,40 @@ places is accepted only as far as it is right for the rest of the maps as well.
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from pydantic import Field
 
+from mapweave.config import Config
 from mapweave.fusion.confidence import ConfidenceParameters, confidence
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
 from mapweave.fusion.parts import PartParameters, agreed, cut
+from mapweave.fusion.rooms import RoomParameters, outside
 from mapweave.geometry import se2
+from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import Alignment, LineMap, RobotMap, component_name
 from mapweave.matching.distance_field import DistanceFieldParameters
-from mapweave.matching.hypotheses import HypothesisParameters, PreparedMap, different, hypothesise
+from mapweave.matching.hypotheses import (
+    HypothesisParameters,
+    PreparedMap,
+    different,
+    hypothesise,
+    propose_all,
+    propose_by_walls,
+)
 from mapweave.matching.icp import IcpParameters, Target, align_all
-from mapweave.matching.verification import VerificationParameters, shared_complexity, verify
+from mapweave.matching.verification import (
+    Verdict,
+    VerificationParameters,
+    shared_complexity,
+    verify,
+)
 from mapweave.parameters import StageParameters, derived
 from mapweave.reasons import Reason, ReasonKind
 
@@ -33,7 +49,10 @@ from mapweave.reasons import Reason, ReasonKind
 class FusionParameters(StageParameters):
     """One model for each stage."""
 
-    raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)
+    # Who stays longer in a room is not surer of which room it is.
+    raster: DistanceFieldParameters = derived(
+        lambda c: DistanceFieldParameters.of(c, same_wall=0.5)
+    )
     hypotheses: HypothesisParameters = derived(HypothesisParameters.of)
     # Right transforms contradict next to nothing, wrong ones a metre in ten: at a weight of 5 the
     # right one scored highest for every pair of stretches with 10 m and more in common.
@@ -48,6 +67,7 @@ class FusionParameters(StageParameters):
     icp_samples: int = Field(250, ge=10, description="of a map's walls, aligning hypotheses")
     loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
     confidence: ConfidenceParameters = ConfidenceParameters()
+    rooms: RoomParameters = RoomParameters()
     parts: PartParameters = derived(PartParameters.of)
     decision: DecisionParameters = derived(DecisionParameters.of)
     reach: ExtrapolationParameters = ExtrapolationParameters()
@@ -55,7 +75,10 @@ class FusionParameters(StageParameters):
 
 
 def align(
-    reference: RobotMap, other: RobotMap, parameters: FusionParameters | None = None
+    reference: RobotMap,
+    other: RobotMap,
+    parameters: FusionParameters | None = None,
+    config: Config | None = None,
 ) -> list[Alignment]:
     """Compare every component of `reference` with every one of `other` (paper, VIII).
 
@@ -64,7 +87,9 @@ def align(
     reference, other
         Maps of two robots, which need share nothing.
     parameters
-        Of each stage.
+        Of each stage; those that derive from `config` by default.
+    config
+        What both maps were made with; by default the default one.
 
     Returns
     -------
@@ -72,14 +97,31 @@ def align(
         One for each pair of components, accepted, ambiguous or refused: each says how sure it is,
         and why.
 
+    Raises
+    ------
+    ArgumentError
+        If one of them is no such thing.
+
     Examples
     --------
     >>> align(RobotMap("a", "0", 0, ()), RobotMap("b", "0", 0, ()))  # nothing in them
     []
     """
-    p = parameters or FusionParameters()
+    for name, value in (("reference", reference), ("other", other)):
+        check_kind(name, value, RobotMap)
+    p = _parameters(parameters, config)
     ours, theirs = ([_Component(m, c, p) for c in m.components] for m in (reference, other))
     return [_align(a, b, p) for a, b in itertools.product(ours, theirs)]
+
+
+def _parameters(parameters: FusionParameters | None, config: Config | None) -> FusionParameters:
+    """Return `parameters`, or else those that derive from `config`; ArgumentError if neither is."""
+    if parameters is not None:
+        check_kind("parameters", parameters, FusionParameters)
+        return parameters
+    config = Config() if config is None else config
+    check_kind("config", config, Config)
+    return FusionParameters.of(config)
 
 
 class _Component:
@@ -177,12 +219,58 @@ def compare(
     if first is None or second is None:
         poor = ReasonKind.SMALL_REFERENCE if first is None else ReasonKind.SMALL_OTHER
         return _no_alignment(a, b, Reason(poor, {"min_wall": p.min_wall}))
-    ranked = find_alignments(first, second, p, possible)
+    found = _by_walls(a, first, b, second, p) if possible is None else None
+    if isinstance(found, Alignment):
+        return found
+    ranked = find_alignments(first, second, p, possible if found is None else found)
+    return _decided(a, first, b, second, ranked, p)
+
+
+def _by_walls(
+    a: str, first: PreparedMap, b: str, second: PreparedMap, p: FusionParameters
+) -> Alignment | FloatArray:
+    """Return the alignment that parallel walls alone prove; else all that is proposed (n, 3).
+
+    It is convincing as it stands, its rivals among what was proposed: shapes need not be looked
+    for. Where cells tell already that it will not be, it is not tried.
+    """
+    shifted, scores = propose_by_walls(first, second, p.hypotheses, p.verification)
+    middle = second.raster.oriented.points.mean(axis=0)
+    leaders = different(shifted, scores, middle, p.hypotheses)
+    if _may_convince(scores[leaders[:2]].tolist(), p):
+        ranked = find_alignments(first, second, p, shifted)
+        found = _decided(a, first, b, second, ranked, p)
+        if found.decision == "accepted":
+            return found
+    return propose_all(first, second, shifted, p.hypotheses)
+
+
+def _may_convince(scores: Sequence[float], p: FusionParameters) -> bool:
+    """Tell whether the first of `scores` [m] would do, were it held evenly, with such a rival."""
+    weight = p.verification.contradiction_weight
+    best, rival = (
+        Verdict(score, 0.0, 1.0, 0.0, score / 2, weight) for score in (*scores, 0.0, 0.0)[:2]
+    )
+    return confidence(best, rival, p.confidence) >= p.decision.min_confidence
+
+
+def _decided(
+    a: str,
+    first: PreparedMap,
+    b: str,
+    second: PreparedMap,
+    ranked: Sequence[Hypothesis],
+    p: FusionParameters,
+) -> Alignment:
+    """Return the alignment that the best of hypotheses is, and what is decided about it."""
     if not ranked:
         return _no_alignment(a, b, Reason(ReasonKind.NO_SHAPE))
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
-    decision, cause = decide(best, rival, sure, p.decision)
+    beyond = outside(first.raster, second.raster, best.transform, p.verification, p.rooms)
+    one_room = beyond < p.rooms.min_outside
+    sure *= p.rooms.unique if one_room else 1.0
+    decision, cause = decide(best, rival, sure, p.decision, beyond if one_room else None)
     return Alignment(
         a,
         b,

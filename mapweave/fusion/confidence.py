@@ -13,15 +13,19 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry.arrays import FloatArray
 from mapweave.matching.verification import Verdict
 
+LEAST_OVERLAP = 0.8  # less tells no more
+
 
 class ConfidenceParameters(BaseModel):
     """Coefficients of the logistic model, one for each of `features`, and the rival's share."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    intercept: float = Field(-10.4, description="log odds where all features are 0")
-    score: float = Field(3.62, description="for ln(1 + metres in common less those contradicted)")
-    held: float = Field(1.66, description="for ln(1 + metres that hold the weakest direction)")
+    intercept: float = Field(-19.9, description="log odds where all features are 0")
+    score: float = Field(2.83, description="for ln(1 + metres in common less those contradicted)")
+    held: float = Field(2.02, description="for ln(1 + metres that hold the weakest direction)")
+    overlap: float = Field(8.58, description="for the share in common, 0.8 counting 0 and 1 as 1")
+    lead: float = Field(1.98, description="for ln(1 + metres of score before the rival)")
     rivalry: float = Field(
         12.0,
         gt=0,
@@ -31,9 +35,12 @@ class ConfidenceParameters(BaseModel):
     )
 
 
-def features(best: Verdict) -> FloatArray:
-    """Return (2,) what the model looks at: score and held."""
-    return np.log1p(np.maximum([best.score, best.held], 0.0))
+def features(best: Verdict, rival: Verdict | None) -> FloatArray:
+    """Return (4,) what the model looks at: score, held, share in common, and lead."""
+    score, ahead = max(best.score, 0.0), max(rival.score, 0.0) if rival else 0.0
+    metres = np.log1p([score, max(best.held, 0.0), max(score - ahead, 0.0)])
+    overlap = np.clip((best.overlap - LEAST_OVERLAP) / (1 - LEAST_OVERLAP), 0.0, 1.0)
+    return np.array([metres[0], metres[1], overlap, metres[2]])
 
 
 def share(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
@@ -48,8 +55,8 @@ def share(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters
 def confidence(best: Verdict, rival: Verdict | None, parameters: ConfidenceParameters) -> float:
     """Return the probability that the best hypothesis has the right place, in (0, 1)."""
     p = parameters
-    slopes = np.array([p.score, p.held])
-    either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best))))
+    slopes = np.array([p.score, p.held, p.overlap, p.lead])
+    either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best, rival))))
     return float(either * share(best, rival, p))
 
 

@@ -11,9 +11,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
+from mapweave.geometry.arguments import as_segments
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap
@@ -162,7 +164,7 @@ def most_similar(part: FloatArray, lines: LineMap) -> Counterpart | None:
     return Counterpart(stretch_of(polyline, best.start, best.end), best.similarity)
 
 
-def congruent_alignment(part: FloatArray, match: FloatArray) -> FloatArray:
+def congruent_alignment(part: ArrayLike, match: ArrayLike) -> FloatArray:
     """Return the transform that lays polyline `match` on polyline `part` congruently (VIII, V1).
 
     s "not only measures shape differences, but also determines the points' correspondence and the
@@ -173,7 +175,7 @@ def congruent_alignment(part: FloatArray, match: FloatArray) -> FloatArray:
     Parameters
     ----------
     part, match
-        (n, 4) and (m, 4) x1 y1 x2 y2 [m], each in the frame of its map.
+        (n, 4) and (m, 4) x1 y1 x2 y2 [m], or (n, 2) vertices [m], each in the frame of its map.
 
     Returns
     -------
@@ -182,9 +184,12 @@ def congruent_alignment(part: FloatArray, match: FloatArray) -> FloatArray:
 
     Raises
     ------
+    ArgumentError
+        If one of them has another shape, or holds NaN or infinity.
     NoShapeError
         If one of them has no length.
     """
+    part, match = as_segments("part", part), as_segments("match", match)
     _, theta = similarity(match, part)
     shift = _centroid(part) - se2.rotation(theta) @ _centroid(match)
     return np.array([shift[0], shift[1], theta])
@@ -207,7 +212,7 @@ def shared_complexity(reference: LineMap, other: LineMap, threshold: float) -> f
 
 
 def close_parts(
-    first: FloatArray, second: FloatArray, threshold: float
+    first: ArrayLike, second: ArrayLike, threshold: float
 ) -> tuple[BoolArray, BoolArray]:
     """Tell which segments are of M_1' and of M_2', so that H(M_1', M_2') is below `threshold` (V2).
 
@@ -224,7 +229,7 @@ def close_parts(
     return np.asarray(near.any(axis=1)), np.asarray(near.any(axis=0))
 
 
-def hausdorff(first: FloatArray, second: FloatArray) -> FloatArray:
+def hausdorff(first: ArrayLike, second: ArrayLike) -> FloatArray:
     """Return the (n, m) Hausdorff distances of segments [m] (VIII-C).
 
     "Hausdorff distance of line segments can be implemented by considering their endpoints": the
@@ -235,6 +240,7 @@ def hausdorff(first: FloatArray, second: FloatArray) -> FloatArray:
     first, second
         (n, 4) and (m, 4) x1 y1 x2 y2 [m], one frame.
     """
+    first, second = as_segments("first", first), as_segments("second", second)
     there = np.maximum(_distance(first[:, :2], second), _distance(first[:, 2:], second))
     back = np.maximum(_distance(second[:, :2], first), _distance(second[:, 2:], first))
     return np.asarray(np.maximum(there, back.T))

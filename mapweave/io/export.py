@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mapweave.errors import FileError
+from mapweave.geometry.arguments import check_kind
 from mapweave.io.exporters import dxf, geojson, map_server, tum
 from mapweave.maps import JointMap, RobotMap
 from mapweave.pictures.picture import PICTURE_SUFFIXES, plot
@@ -36,7 +37,10 @@ def export(some_map: RobotMap | JointMap, path: str | Path) -> None:
         written.
     MissingExtraError
         If a package that it takes is not installed: matplotlib for pictures, ezdxf for DXF.
+    ArgumentError
+        If it is no map.
     """
+    check_kind("some_map", some_map, RobotMap, JointMap)
     path = Path(path)
     check_export_suffix(path)
     WRITERS[path.suffix.lower()](some_map, path)

@@ -6,7 +6,7 @@ Numbers are rounded to 0.1 mm and 1 µrad, far below what a laser resolves, to k
 import json
 import math
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TypeVar
@@ -18,7 +18,8 @@ from pydantic import ValidationError
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError
 from mapweave.evidence import RunnerUp
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.arguments import check_kind
+from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_schema import JOINT_FORMAT, MAP_FORMAT, HeaderFile, JointFile, MapFile
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
 from mapweave.maps import (
@@ -32,13 +33,14 @@ from mapweave.maps import (
     Trajectory,
 )
 from mapweave.reasons import Reason, Status
+from mapweave.scan.coverage import coverage
 
 _EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
 _METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
 """Decimals that are written of each kind of number."""
 
 _File = TypeVar("_File", HeaderFile, MapFile, JointFile)
-_Values = TypeVar("_Values", FloatArray, IntArray)
+T = TypeVar("T")
 
 
 def read_map(path: str | Path) -> RobotMap:
@@ -99,7 +101,10 @@ def save(some_map: RobotMap | JointMap, path: str | Path) -> None:
     ------
     FileError
         If it cannot be written.
+    ArgumentError
+        If it is no map.
     """
+    check_kind("some_map", some_map, RobotMap, JointMap)
     if isinstance(some_map, RobotMap):
         write_map(path, some_map)
     else:
@@ -133,14 +138,18 @@ def write_joint(path: str | Path, joint: JointMap) -> None:
     FileError
         If it cannot be written.
     """
-    content = {
+    _write(path, joint_content(joint))
+
+
+def joint_content(joint: JointMap) -> dict[str, object]:
+    """Return what is in the file of `joint`, for `json.dumps`."""
+    return {
         "format": JOINT_FORMAT,
         "version": joint.version,
         **_made_with(joint.made_with),
-        "alignments": [_alignment(alignment) for alignment in joint.alignments],
+        "alignments": [alignment_content(alignment) for alignment in joint.alignments],
         "components": [_component(component) for component in joint.components],
     }
-    _write(path, content)
 
 
 def _content(path: Path) -> bytes:
@@ -219,19 +228,28 @@ def _uncertainty(trajectory: Trajectory) -> dict[str, object]:
 
 def _line_map(lines: LineMap) -> dict[str, object]:
     return {
-        "polylines": [_metres(polyline) for polyline in lines.polylines],
-        "support": [row.tolist() for row in _by_polyline(lines, lines.support)],
-        "free_space": [_metres(polygon) for polygon in lines.free_space],
+        "polylines": _by_polyline(lines, _metres(lines.segments)),
+        "support": _by_polyline(lines, lines.support.tolist()),
+        "free_space": _polygons(lines.free_space),
     }
 
 
-def _by_polyline(lines: LineMap, values: _Values) -> list[_Values]:
+def _by_polyline(lines: LineMap, values: list[T]) -> list[list[T]]:
     """Split `values`, one for each segment, as the segments are split into polylines."""
-    starts = np.flatnonzero(np.diff(lines.polyline)) + 1
-    return np.split(values, starts) if len(values) else []
+    starts = (np.flatnonzero(np.diff(lines.polyline)) + 1).tolist()
+    ends = [*starts, len(values)] if values else []
+    return [values[start:end] for start, end in zip([0, *starts], ends, strict=False)]
 
 
-def _alignment(alignment: Alignment) -> dict[str, object]:
+def _polygons(rings: Sequence[FloatArray]) -> list[list[list[float]]]:
+    """Return the corners of all `rings`, rounded at once: there are hundreds."""
+    corners = _metres(np.concatenate([np.empty((0, 2)), *rings]))
+    ends = np.cumsum([len(ring) for ring in rings], dtype=np.int64).tolist()
+    return [corners[end - len(ring) : end] for ring, end in zip(rings, ends, strict=True)]
+
+
+def alignment_content(alignment: Alignment) -> dict[str, object]:
+    """Return one of the ``alignments`` of a joint map's file."""
     return {
         "reference": alignment.reference,
         "other": alignment.other,
@@ -272,12 +290,15 @@ def _cause(cause: Reason) -> dict[str, object]:
 
 
 def _component(component: JointComponent) -> dict[str, object]:
-    confidences = _by_polyline(component.map, component.segment_confidence)
+    confidences = np.round(component.segment_confidence, _METRES).tolist()
+    searched = coverage(component.map)
     return {
         "robots": {name: _pose(pose) for name, pose in component.robots.items()},
         "confidence": _number(component.confidence, _RATIOS),
         **_line_map(component.map),
-        "segment_confidence": [np.round(row, _METRES).tolist() for row in confidences],
+        "segment_confidence": _by_polyline(component.map, confidences),
+        "explored_m2": round(searched.explored, 1),
+        "frontiers": [np.round(line, _METRES).tolist() for line in searched.frontiers],
     }
 
 

@@ -283,6 +283,8 @@ class ComponentFile(_LinesFile):
     confidence: _Probability
     segment_confidence: list[list[_Probability]]
     free_space: list[_Polygon] = []
+    explored_m2: float | None = None  # both follow from the map, and are not read
+    frontiers: list[list[tuple[float, float]]] = []
 
     @model_validator(mode="after")
     def _confidence_fits(self) -> "ComponentFile":

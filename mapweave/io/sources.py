@@ -49,6 +49,9 @@ class ScanSource(Protocol):
             If they cannot be read any further.
         """
 
+    def close(self) -> None:
+        """End `scans`, from another thread; nothing where only their writer can end them."""
+
 
 SourceOpener: TypeAlias = Callable[[str, ReadOptions], ScanSource]
 
@@ -103,6 +106,9 @@ class Recording:
             on_warning=self.options.on_warning,
         )
 
+    def close(self) -> None:
+        """Nothing: who reads it stops reading."""
+
 
 @dataclass(frozen=True, slots=True)
 class StandardInput:
@@ -118,6 +124,9 @@ class StandardInput:
         """As `read_scan_lines`."""
         lines = split_lines(_blocks(sys.stdin.fileno()))
         return read_scan_lines("standard input", lines, self.options)
+
+    def close(self) -> None:
+        """Nothing: nobody can wake who waits for a writer."""
 
 
 def _blocks(descriptor: int) -> Iterator[bytes]:

@@ -8,6 +8,8 @@
 
 namespace correlative {
 
+constexpr int64_t kMany = 1000;  // points at all turns, from which laying out the field anew is worth it
+
 // (size + 1, size + 1) nearness in [0, 1]; the last row and column stand for everything outside: 0.
 inline Out<float> nearness_field(In<double, 2> points, In<double, 1> origin, double cell, int64_t size,
                                  double sigma) {
@@ -40,6 +42,35 @@ inline Out<float> nearness_field(In<double, 2> points, In<double, 1> origin, dou
   return give(std::move(value), {static_cast<size_t>(side), static_cast<size_t>(side)});
 }
 
+// The cells between shifts along a line, if they are the same between all of them; else 0.
+inline int64_t stride_of(const std::vector<int64_t>& base) {
+  if (base.size() < 4 || base[3] <= base[1]) return 0;
+  for (size_t k = 3; k < base.size(); k += 2)
+    if (base[k] - base[k - 2] != base[3] - base[1]) return 0;
+  return base[3] - base[1];
+}
+
+// The field's lines with every `stride`-th cell side by side: what a row of shifts looks up.
+class Strided {
+ public:
+  Strided(const float* field, int64_t side, int64_t stride)
+      : side_(side), stride_(stride), run_((side + stride - 1) / stride),
+        cells_(static_cast<size_t>(side * stride * run_), 0.0f) {
+    for (int64_t i = 0; i < side; ++i)
+      for (int64_t phase = 0; phase < stride; ++phase) {
+        float* to = cells_.data() + (i * stride + phase) * run_;
+        for (int64_t j = phase; j < side; j += stride) *to++ = field[i * side + j];
+      }
+  }
+
+  // From cell j of line i on; j is in the field.
+  const float* from(int64_t i, int64_t j) const { return cells_.data() + (i * stride_ + j % stride_) * run_ + j / stride_; }
+
+ private:
+  int64_t side_, stride_, run_;
+  std::vector<float> cells_;
+};
+
 // (t, s, s) summed nearness of the points, turned by each of t turns and moved by each pair of s shifts.
 inline Out<float> window_scores(In<double, 2> points, In<float, 2> field, In<double, 1> origin, double cell,
                                 In<double, 1> turns, In<double, 2> shifts) {
@@ -53,6 +84,8 @@ inline Out<float> window_scores(In<double, 2> points, In<float, 2> field, In<dou
       base[2 * k + a] = static_cast<int64_t>(std::nearbyint((shifts.data()[2 * k + a] - origin.data()[a]) / cell));
   std::vector<float> scores(static_cast<size_t>(t * s * s), 0.0f);
   std::vector<int64_t> rows(static_cast<size_t>(s));
+  const int64_t stride = t * n >= kMany ? stride_of(base) : 0;
+  const Strided strided(field.data(), stride ? outside + 1 : 0, stride ? stride : 1);
   for (int64_t k = 0; k < t; ++k) {
     const double c = std::cos(turns.data()[k]), sn = std::sin(turns.data()[k]);
     float* out = scores.data() + k * s * s;
@@ -60,14 +93,23 @@ inline Out<float> window_scores(In<double, 2> points, In<float, 2> field, In<dou
       const double* p = points.data() + 2 * i;
       const int64_t column = static_cast<int64_t>(std::floor((c * p[0] - sn * p[1]) / cell));
       const int64_t row = static_cast<int64_t>(std::floor((sn * p[0] + c * p[1]) / cell));
-      for (int64_t b = 0; b < s; ++b) {
+      const int64_t first = row + base[1];
+      const bool inside = stride && first >= 0 && first + (s - 1) * stride <= outside;
+      for (int64_t b = 0; b < s && !inside; ++b) {
         const int64_t j = row + base[2 * b + 1];
         rows[b] = j < 0 || j > outside ? outside : j;
       }
       for (int64_t a = 0; a < s; ++a) {
         const int64_t at = column + base[2 * a];
-        const float* line = field.data() + (at < 0 || at > outside ? outside : at) * (outside + 1);
-        for (int64_t b = 0; b < s; ++b) out[a * s + b] += line[rows[b]];
+        const int64_t line_number = at < 0 || at > outside ? outside : at;
+        float* sums = out + a * s;
+        if (inside) {
+          const float* run = strided.from(line_number, first);
+          for (int64_t b = 0; b < s; ++b) sums[b] += run[b];
+          continue;
+        }
+        const float* line = field.data() + line_number * (outside + 1);
+        for (int64_t b = 0; b < s; ++b) sums[b] += line[rows[b]];
       }
     }
   }

@@ -4,6 +4,7 @@
 #include "clearing.hpp"
 #include "correlative.hpp"
 #include "denials.hpp"
+#include "density.hpp"
 #include "evidence.hpp"
 #include "main_directions.hpp"
 #include "marks.hpp"
@@ -19,6 +20,7 @@
 #include "segmentation.hpp"
 #include "slivers.hpp"
 #include "viewpoints.hpp"
+#include "windows.hpp"
 
 namespace nb = nanobind;
 
@@ -27,6 +29,7 @@ NB_MODULE(_compiled, m) {
   bind_clearing(m);
   bind_correlative(m);
   bind_denials(m);
+  bind_density(m);
   bind_evidence(m);
   bind_main_directions(m);
   bind_marks(m);
@@ -42,4 +45,5 @@ NB_MODULE(_compiled, m) {
   bind_segmentation(m);
   bind_slivers(m);
   bind_viewpoints(m);
+  bind_windows(m);
 }

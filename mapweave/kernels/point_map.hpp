@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "sectors.hpp"
 
 namespace point_map {
 
@@ -44,6 +45,36 @@ struct Fit {
   double support;  // summed weight of the pairs
 };
 
+// The nearest point to a place, and how near another one can be.
+struct Nearest {
+  const Point* point;  // none within reach: null
+  double others;       // [m²] squared distance below which no other point is
+};
+
+// A point's partner, when it was looked up last. While the point has moved less since than any other partner
+// is farther away, it is still the nearest: so says the triangle's inequality, and nothing is looked up.
+struct Partner {
+  const Point* point = nullptr;
+  const Point* guess = nullptr;  // the last that there was
+  double x, y, u, v;             // where it was looked up from
+  double others = -1;            // [m] below which no other point was; -1 before the first time
+
+  const Point* again(double to_x, double to_y, double to_u, double to_v, double reach, bool& known) const {
+    const double dx = x - to_x, dy = y - to_y, du = u - to_u, dv = v - to_v;
+    const double room = others - std::sqrt(dx * dx + dy * dy + (du * du + dv * dv)) - 1e-9;
+    known = false;
+    if (room <= 0) return nullptr;
+    if (!point) {
+      known = room >= reach;
+      return nullptr;
+    }
+    const double ax = point->x - to_x, ay = point->y - to_y, au = point->u - to_u, av = point->v - to_v;
+    const double squared = ax * ax + ay * ay + (au * au + av * av);
+    known = squared < room * room;
+    return squared < reach * reach ? point : nullptr;
+  }
+};
+
 // A start on its way.
 struct Attempt {
   std::array<double, 3> start;
@@ -51,7 +82,7 @@ struct Attempt {
   double scale;
   int iterations = 0;
   bool settled = false;
-  std::vector<const Point*> partner;  // of the iteration before: a good guess
+  std::vector<Partner> partner;  // of each point, in the iteration before
 };
 
 // Solves the symmetric positive definite 3 x 3 system by Cholesky's factors.
@@ -155,7 +186,7 @@ class PointMap {
     for (size_t j = 0; j < k; ++j) {
       const double* from = starts.data() + 3 * j;
       attempts.push_back({{from[0], from[1], from[2]}, {from[0], from[1], from[2], {}, 0}, p.start_scale});
-      attempts.back().partner.assign(n, nullptr);
+      attempts.back().partner.resize(n);
     }
     const auto go_on = [&](Attempt& attempt, int until) {
       while (!attempt.settled && attempt.iterations < until)
@@ -200,8 +231,7 @@ class PointMap {
                            int64_t every) const {
     const size_t k = check_poses(poses);
     if (every < 1 || clear.shape(0) < 1) throw std::invalid_argument("every: 1 or more, clear: a beam or more expected");
-    const int64_t beams = static_cast<int64_t>(clear.shape(0));
-    const bool closed = beams * spacing > kTurn - spacing / 2;
+    const sectors::Beams beams(clear.data(), static_cast<int64_t>(clear.shape(0)), first, spacing, clearance);
     std::vector<double> shares(k, 0.0);
     for (size_t j = 0; j < k; ++j) {
       const double* pose = poses.data() + 3 * j;
@@ -219,14 +249,7 @@ class PointMap {
           if (!(ahead > 0 && ahead * ahead > facing * facing * squared)) continue;
         }
         ++in_sight;
-        double steps = std::fmod(std::atan2(c * dy - s * dx, c * dx + s * dy) - first, kTurn);
-        if (steps < 0) steps += kTurn;
-        steps /= spacing;
-        if (!(steps <= beams - 1 || closed)) continue;
-        int64_t beam = std::llrint(steps);
-        if (beam >= beams) beam = 0;
-        const double before = clear.data()[beam] - clearance;
-        if (before > 0 && squared < before * before) ++through;
+        if (beams.before(c * dx + s * dy, c * dy - s * dx, squared)) ++through;
       }
       if (in_sight) shares[j] = static_cast<double>(through) / static_cast<double>(in_sight);
     }
@@ -329,7 +352,7 @@ class PointMap {
     if (columns * rows * 2 < columns_ * rows_) lay_out(left_ + first - kMargin, low_ + lowest - kMargin, columns, rows);
   }
 
-  // Calls `visit` with each cell of the ring of cells `r` away from (i, j).
+  // Calls `visit` with each cell of the ring of cells `r` away from (i, j), and the number of its column and row.
   template <typename Visit>
   void ring(int64_t i, int64_t j, int64_t r, Visit&& visit) const {
     const int64_t a0 = std::max(i - r, left_), a1 = std::min(i + r, left_ + columns_ - 1);
@@ -337,19 +360,29 @@ class PointMap {
     for (int64_t a = a0; a <= a1; ++a) {
       const std::vector<Point>* column = cells_.data() + (a - left_) * rows_ - low_;
       if (a == i - r || a == i + r) {
-        for (int64_t b = b0; b <= b1; ++b) visit(column[b]);
+        for (int64_t b = b0; b <= b1; ++b) visit(column[b], a, b);
       } else {
-        if (j - r >= low_ && j - r < low_ + rows_) visit(column[j - r]);
-        if (r > 0 && j + r >= low_ && j + r < low_ + rows_) visit(column[j + r]);
+        if (j - r >= low_ && j - r < low_ + rows_) visit(column[j - r], a, j - r);
+        if (r > 0 && j + r >= low_ && j + r < low_ + rows_) visit(column[j + r], a, j + r);
       }
     }
   }
 
-  const Point* nearest(double x, double y, double u, double v, double reach, const Point* guess = nullptr) const {
+  // [m] how far `value` is from the cells of one number, in one coordinate; rounded down.
+  double gap_to(double value, int64_t number) const {
+    const double before = number * cell_ - value, after = value - (number + 1) * cell_;
+    return std::max(0.0, std::max(before, after) - kRounding);
+  }
+
+  const Point* nearest(double x, double y, double u, double v, double reach) const {
+    return nearest_two(x, y, u, v, reach, nullptr).point;
+  }
+
+  Nearest nearest_two(double x, double y, double u, double v, double reach, const Point* guess) const {
     const int64_t i = index(x), j = index(y);
     const double inner = std::min(std::min(x - i * cell_, (i + 1) * cell_ - x),
                                   std::min(y - j * cell_, (j + 1) * cell_ - y));
-    double best = reach * reach;
+    double best = reach * reach, next = std::numeric_limits<double>::infinity();
     const Point* found = nullptr;
     if (guess) {
       const double d = squared(*guess, x, y, u, v);
@@ -359,22 +392,47 @@ class PointMap {
                                       std::max(j - low_, low_ + rows_ - 1 - j));
     for (int64_t r = 0; r <= farthest; ++r) {
       const double gap = r == 0 ? 0.0 : inner + (r - 1) * cell_;  // nothing in this ring is nearer
-      if (gap * gap > best || (r > 0 && gap >= reach)) break;
-      ring(i, j, r, [&](const std::vector<Point>& here) {
+      if (gap * gap > best || (r > 0 && gap >= reach)) {
+        next = std::min(next, gap * gap);
+        break;
+      }
+      ring(i, j, r, [&](const std::vector<Point>& here, int64_t a, int64_t b) {
+        if (here.empty()) return;
+        const double gap_x = gap_to(x, a), gap_y = gap_to(y, b), nearest_here = gap_x * gap_x + gap_y * gap_y;
+        if (nearest_here > best) {
+          next = std::min(next, nearest_here);
+          return;
+        }
         for (const Point& q : here) {
           const double d = squared(q, x, y, u, v);
-          if (d < best || (found && d == best && q.number < found->number)) best = d, found = &q;
+          if (d < best || (found && d == best && q.number < found->number)) {
+            if (found) next = best;
+            best = d, found = &q;
+          } else if (d < next && &q != found) {
+            next = d;
+          }
         }
       });
     }
-    return found;
+    return {found, next};
+  }
+
+  const Point* partner_of(Partner& partner, double x, double y, double u, double v, double reach) const {
+    bool known;
+    const Point* same = partner.again(x, y, u, v, reach, known);
+    if (known) return same;
+    const Nearest found = nearest_two(x, y, u, v, reach, partner.guess);
+    partner.point = found.point;
+    if (found.point) partner.guess = found.point;
+    partner.x = x, partner.y = y, partner.u = u, partner.v = v, partner.others = std::sqrt(found.others);
+    return found.point;
   }
 
   bool any_within(double x, double y, double u, double v, double reach) const {
     const double limit = reach * reach;
-    const int64_t cells = static_cast<int64_t>(std::min(std::ceil(reach / cell_), 1e9));
-    const int64_t i0 = std::max(index(x) - cells, left_), i1 = std::min(index(x) + cells, left_ + columns_ - 1);
-    const int64_t j0 = std::max(index(y) - cells, low_), j1 = std::min(index(y) + cells, low_ + rows_ - 1);
+    const double wide = std::min(reach, 1e9 * cell_) + kRounding;
+    const int64_t i0 = std::max(index(x - wide), left_), i1 = std::min(index(x + wide), left_ + columns_ - 1);
+    const int64_t j0 = std::max(index(y - wide), low_), j1 = std::min(index(y + wide), low_ + rows_ - 1);
     for (int64_t i = i0; i <= i1; ++i)
       for (int64_t j = j0; j <= j1; ++j)
         for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)])
@@ -410,7 +468,6 @@ class PointMap {
                  const In<bool, 2>* corresponding, std::array<double, 3>& gradient) const {
     Fit& fit = attempt.fit;
     const double scale = attempt.scale;
-    std::vector<const Point*>& partner = attempt.partner;
     const double c = std::cos(fit.turn), s = std::sin(fit.turn);
     double xx = 0, xy = 0, xt = 0, yy = 0, yt = 0, tt = 0, gx = 0, gy = 0, gt = 0, support = 0;
     for (size_t i = 0; i < n; ++i) {
@@ -419,8 +476,7 @@ class PointMap {
       const double ax = c * p[0] - s * p[1], ay = s * p[0] + c * p[1];
       const double x = fit.x + ax, y = fit.y + ay;
       const double u = weight_ * (c * m[0] - s * m[1]), v = weight_ * (s * m[0] + c * m[1]);
-      const Point* q = nearest(x, y, u, v, 3 * scale, partner[i]);
-      partner[i] = q ? q : partner[i];
+      const Point* q = partner_of(attempt.partner[i], x, y, u, v, 3 * scale);
       if (!q) continue;
       if (corresponding) {
         if (q->tag < 0 || tags[i] < 0) continue;
@@ -444,6 +500,7 @@ class PointMap {
   }
 
   static constexpr double kWeakest = 1e-6;  // [1/m², 1/rad²] so that a start without pairs stays
+  static constexpr double kRounding = 1e-9;  // [m] by which places may err
   static constexpr int64_t kMargin = 16;  // cells around what is there
   static constexpr int64_t kMaxCells = int64_t{1} << 26;
 };

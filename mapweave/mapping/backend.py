@@ -105,6 +105,10 @@ class BackendRunner(Protocol):
     def begin(self, finished: FinishedSubmap) -> None:
         """Take the next submap; the outcome of the one before must have been taken."""
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether `take` returns at once."""
+
     def take(self) -> BackendResult | None:
         """Wait for the outcome and return it; None if there is none."""
 
@@ -124,6 +128,11 @@ class Backend:
     def begin(self, finished: FinishedSubmap) -> None:
         """Settle the next submap."""
         self._settled = self.settle(finished)
+
+    @property
+    def is_ready(self) -> bool:
+        """Always: `begin` has settled it."""
+        return True
 
     def take(self) -> BackendResult | None:
         """Return the outcome."""

@@ -212,8 +212,12 @@ class ComponentMerger:
         if anywhere.decision == "accepted" or len(possible) == 0:
             return anywhere
         proof = {"min_confidence": p.min_confidence, "min_lead": p.min_lead}
+        # Where track was lost, the room that is there is the same room.
         expected = p.fusion.model_copy(
-            update={"decision": p.fusion.decision.model_copy(update=proof)}
+            update={
+                "decision": p.fusion.decision.model_copy(update=proof),
+                "rooms": p.fusion.rooms.model_copy(update={"min_outside": 0.0, "unique": 1.0}),
+            }
         )
         here = compare(names[0], first, names[1], second, expected, possible)
         # A better place elsewhere says that it was carried away.

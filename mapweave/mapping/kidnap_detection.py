@@ -50,7 +50,11 @@ class KidnapDetectionParameters(StageParameters):
         lambda c: 1.2 * c.mapping.free_range, gt=0, description="[m] up to which returns count"
     )
     doubtful: float = Field(
-        0.08, gt=0, lt=1, description="share of a scan's returns refuted, from which it departs"
+        0.06,
+        gt=0,
+        lt=1,
+        description="share of a scan's returns refuted, from which it departs: of rightly tracked"
+        " ones 1 % are, of departed ones 15 to 20 %, and between these a scan is as likely either",
     )
     recent: int = Field(3, ge=1, description="submaps in a row that are asked, the last ones")
 

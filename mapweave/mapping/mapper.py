@@ -5,18 +5,24 @@ nowhere waits; when several in a row fit nowhere or are blind, the robot is lost
 component.
 """
 
-from dataclasses import dataclass, replace
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
 
 from mapweave.config import Config
 from mapweave.errors import ArgumentError, FinishedError
 from mapweave.geometry import se2
+from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
+from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
+from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
 from mapweave.mapping.tracking.pose_covariance import (
+    EXACT,
     PoseCovarianceParameters,
     pose_uncertainty,
     turn_uncertainty,
@@ -24,12 +30,16 @@ from mapweave.mapping.tracking.pose_covariance import (
 from mapweave.mapping.tracking.tracker import Found, Tracker, TrackerParameters
 from mapweave.maps import LineMap, MadeWith, RobotMap, Submap
 from mapweave.parameters import StageParameters, derived
+from mapweave.scan.own_body import OwnBody, OwnBodyParameters
 from mapweave.scan.scan import UNNUMBERED, Scan
+
+SUSPENSE = 24  # times the patience, while it is open whether a robot sees itself
 
 
 class MapperParameters(StageParameters):
     """One model for each stage."""
 
+    own_body: OwnBodyParameters = derived(OwnBodyParameters.of)
     observation: ObservationParameters = derived(ObservationParameters.of)
     tracker: TrackerParameters = derived(TrackerParameters.of)
     uncertainty: PoseCovarianceParameters = derived(PoseCovarianceParameters.of)
@@ -40,28 +50,6 @@ class MapperParameters(StageParameters):
         description="scans in a row that fit nowhere, were not confirmed by the next one, or were"
         " blind, before the robot counts as lost",
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Placement:
-    """What became of a scan.
-
-    Attributes
-    ----------
-    placed
-        Whether it is in the map; one that waits may be placed by a later call.
-    component
-        The component the robot is in now.
-    submap_finished
-        Whether this call finished a submap.
-    lost
-        Whether this call started a new component.
-    """
-
-    placed: bool
-    component: int
-    submap_finished: bool
-    lost: bool
 
 
 class Mapper:
@@ -86,6 +74,11 @@ class Mapper:
         between; the map is the same.
     config
         What the map says that it was made with, unless other parameters are given.
+    live
+        Whether no scan may wait for the backend: a submap grows on while the one before it is
+        being settled. The map then depends on how fast that is.
+    on_warning
+        Told in words what is odd about the scans, once: that the robot sees itself.
     """
 
     def __init__(
@@ -95,25 +88,34 @@ class Mapper:
         parameters: MapperParameters | None = None,
         backend: BackendRunner | None = None,
         config: Config | None = None,
+        *,
+        live: bool = False,
+        on_warning: Callable[[str], None] | None = None,
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
-        config = config or Config()
+        config = Config() if config is None else config
+        check_kind("config", config, Config)
         self.parameters = parameters or MapperParameters.of(config)
         known = self.parameters == MapperParameters.of(config)
         self._made_with = MadeWith.of(config) if known else None
         self._version = 0
         self._finished: list[Submap] = []
         self._component = self._newest_component = 0
+        self._on_warning = on_warning
+        self._body = OwnBody(self.parameters.own_body)
+        # Raw scans so far, as long as no submap is finished.
+        self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._tracker = Tracker(self.parameters.tracker)
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         self._backend = backend or Backend(self.parameters.backend)
-        self._settling = self._growing  # what built the last finished submap
-        self._unsettled = False  # whether the last finished submap is being settled
+        self._live = live
+        self._unsettled: Unsettled | None = None  # the last finished submap, while it is settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
+        self._held: FloatArray = EXACT  # how surely the last scan is placed, tracker's frame
         self._next_index = 0  # of scans that have no number, and the least of those that have
         self._is_finished = False
 
@@ -135,17 +137,17 @@ class Mapper:
         FinishedError
             After `finish`.
         ArgumentError
-            If its index is not above that of the scan before it.
+            If it is no scan, or its index is not above that of the scan before it.
         """
-        seen = observe(self._numbered(scan), self.parameters.observation)
+        check_kind("scan", scan, Scan)
+        scan = self._numbered(scan)
         finished = len(self._finished)
-        lost = False
-        placed = self._place(seen)
-        if len(self._tracker.missed) >= self.parameters.patience:
-            self._start_again()
-            lost = True
-            placed = seen.scan.index in self._merged
-        return Placement(placed, self._component, len(self._finished) > finished, lost)
+        if self._body.watch(scan):
+            self._judge_again()
+        placed, lost = self._take(scan)
+        pose, uncertainty = self._whereabouts() if placed else (None, None)
+        submap_finished = len(self._finished) > finished
+        return Placement(placed, self._component, submap_finished, lost, pose, uncertainty)
 
     def finish(self) -> RobotMap:
         """Finish the growing submap, as at the end of a log, and return the map.
@@ -164,8 +166,22 @@ class Mapper:
     def robot_map(self) -> RobotMap:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap(self._growing.line_map())]
-        submaps = (*self._with_walls(self._finished), *growing)
+        submaps = (*with_walls(self._finished, self._unsettled), *growing)
         return RobotMap(self.robot, self.boot, self._version, submaps, self._made_with)
+
+    def snapshot(self) -> MapSnapshot:
+        """Return what `robot_map` would draw now, to be drawn by another thread: takes a moment."""
+        empty = self._growing.is_empty
+        return MapSnapshot(
+            self.robot,
+            self.boot,
+            self._version,
+            self._made_with,
+            tuple(self._finished),
+            self._unsettled,
+            None if empty else self._submap(LineMap.empty()),
+            b"" if empty else MapSnapshot.packed(self._growing),
+        )
 
     def _numbered(self, scan: Scan) -> Scan:
         """Return `scan` with its index, which may be the next; errors as of `add`."""
@@ -179,11 +195,65 @@ class Mapper:
         self._next_index = index + 1
         return replace(scan, index=index) if scan.index == UNNUMBERED else scan
 
+    def _take(self, scan: Scan) -> tuple[bool, bool]:
+        """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
+        if not self._finished:
+            self._early.append(scan)
+        seen = observe(self._body.without(scan), self.parameters.observation)
+        placed = self._place(seen)
+        if len(self._tracker.missed) < self._patience(seen):
+            return placed, False
+        self._start_again()
+        return scan.index in self._merged, True
+
+    def _patience(self, seen: Observation) -> int:
+        """How many scans may be missed: more until it is known whether the robot sees itself.
+
+        Not where it sees nothing: what it sees of itself is not what it was lost by.
+        """
+        undecided = not self._finished and self._body.is_suspected
+        undecided &= not self._tracker.is_blind(seen)
+        return self.parameters.patience * (SUSPENSE if undecided else 1)
+
+    def _judge_again(self) -> None:
+        """Map all there is once more, as it is now known what of it is the robot's own body.
+
+        What is in a finished submap stays as it is.
+        """
+        self._say_body()
+        if self._finished:
+            return
+        early = list(self._early)
+        self._early.clear()
+        self._tracker = Tracker(self.parameters.tracker)
+        self._growing = SubmapBuilder(self.parameters.backend.submap)
+        self._origin = self._frame = se2.IDENTITY
+        self._merged = {}
+        self._version += 1
+        for scan in early:
+            self._take(scan)
+
+    def _say_body(self) -> None:
+        """Tell once that the robot sees itself."""
+        if self._on_warning is None or not self._body.reach.any():
+            return
+        wide, far = self._body.extent
+        self._on_warning(
+            f"{self.robot} sees itself: {wide:.0f}° of its field of view, up to {far:.2f} m away,"
+            " keep their place while all else moves; what is there is left out"
+        )
+        self._on_warning = None
+
     def _place(self, seen: Observation) -> bool:
         """Follow the robot to a scan; merge it, and those missed before it."""
         found = self._tracker.place(seen, self._known)
         self._merge_all(found)
         return any(each is seen for each, _ in found)
+
+    def _whereabouts(self) -> tuple[FloatArray, FloatArray]:
+        """Return (3,) where the last scan was placed and (4,) how surely, component frame."""
+        turned = turn_uncertainty(self._held, self._origin[2])
+        return se2.compose(self._origin, self._tracker.pose), turned
 
     def _merge_all(self, found: Found) -> None:
         for seen, tracked in found:
@@ -207,7 +277,7 @@ class Mapper:
         if not self._growing.is_empty:
             self._finish_submap()
         if any(s.component == self._component for s in self._finished):
-            self._component = self._newest_component = self._spare() + self._unsettled
+            self._component = self._newest_component = self._spare() + (self._unsettled is not None)
         self._follows = False
         self._tracker = self._tracker.afresh()
         self._origin = self._frame = se2.IDENTITY
@@ -216,12 +286,14 @@ class Mapper:
 
     def _merge(self, seen: Observation, tracked: ScanMatch) -> None:
         """Merge a scan where it was found, tracker's frame, into the growing submap."""
-        if self._growing.is_full:
+        if self._growing.is_full and (self._unsettled is None or self._may_settle()):
             self._finish_submap()
         if self._growing.is_empty:
             self._frame = tracked.pose
         local = se2.between(self._frame, tracked.pose)
         held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
+        if seen.scan.index == self._next_index - 1:  # not one that is found again with it
+            self._held = held
         held = turn_uncertainty(held, -self._frame[2])
         self._growing.add(seen.scan, seen.segments, local, held)
         self._merged[seen.scan.index] = seen
@@ -236,19 +308,19 @@ class Mapper:
             FinishedSubmap(submap, scans, self._growing, self._follows, self._spare())
         )
         self._finished.append(submap)
-        self._settling, self._unsettled, self._follows = self._growing, True, True
+        self._unsettled, self._follows = Unsettled(self._growing), True
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._merged = {}
         self._version += 1
 
     def _adopt_settled(self) -> None:
         """Move everything to where it settled, the growing submap with the last scan before it."""
-        if not self._unsettled:
+        if self._unsettled is None:
             return
         settled = self._backend.take()
         if settled is None:
-            self._finished = self._with_walls(self._finished)
-        self._unsettled = False
+            self._finished = with_walls(self._finished, self._unsettled)
+        self._unsettled = None
         if settled is None:
             return
         before = _end(self._finished[-1])
@@ -268,11 +340,9 @@ class Mapper:
         """
         return self._newest_component + 1
 
-    def _with_walls(self, submaps: list[Submap]) -> list[Submap]:
-        """Return `submaps`, of the one that is being settled the walls, and not its outline."""
-        if not self._unsettled:
-            return submaps
-        return [*submaps[:-1], replace(submaps[-1], map=self._settling.line_map())]
+    def _may_settle(self) -> bool:
+        """Whether the next submap can be handed over now: `live`, no scan waits for the last."""
+        return not self._live or self._backend.is_ready
 
     def _submap(self, lines: LineMap) -> Submap:
         """Return the growing submap with its `lines`."""

@@ -13,6 +13,7 @@ from pydantic import Field
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from mapweave.geometry.segments import lengths
 from mapweave.kernels.matching import rasters
+from mapweave.kernels.matching.density import times_drawn
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, points_on_lines
@@ -30,6 +31,13 @@ class DistanceFieldParameters(StageParameters):
         2, ge=1, description="scans that make a wall count in full; one may have seen a passer-by"
     )
     max_cells: int = Field(4_000_000, gt=0, description="a larger map gets coarser cells")
+    same_wall: float = Field(
+        0.0,
+        ge=0,
+        description="[m] around a sample within which wall that faces as it does is the same wall,"
+        " drawn by another submap or drawn twice, and counts once; at 0 all counts",
+    )
+    min_cosine: float = Field(0.8, gt=0, le=1, description="of normals of the same wall: 37°")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +49,7 @@ class DistanceField:
     surface
         (n,) oriented samples of the walls, map frame.
     weight
-        (n,) metres of wall that each stands for.
+        (n,) metres of wall that each stands for; a part of them where the wall is drawn again.
     segment
         (n,) which segment of the map each is of.
     origin
@@ -78,7 +86,11 @@ class DistanceField:
         length = lengths(line_map.segments)
         counts = np.bincount(segment, minlength=len(length))
         trust = np.minimum(1.0, line_map.support / p.full_support)
-        weight = (trust * length / np.maximum(counts, 1))[segment]
+        step = length / np.maximum(counts, 1)
+        weight = (trust * step)[segment]
+        if p.same_wall > 0:
+            drawn = oriented.points, oriented.normals, step[segment]
+            weight = weight / times_drawn(*drawn, p.same_wall, p.min_cosine)
         low = oriented.points.min(axis=0) - p.border
         high = oriented.points.max(axis=0) + p.border
         cell = max(p.cell, float(np.sqrt(np.prod(high - low) / p.max_cells)))

@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 from pydantic import Field
 
-from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray
+from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from mapweave.kernels.matching.marks import (
     Complex64Array,
     Places,
@@ -115,13 +115,13 @@ def correlate(
     turns: FloatArray,
     weight: float,
     parameters: FftCorrelationParameters,
-) -> FloatArray:
+) -> tuple[FloatArray, FloatArray]:
     """Return (m, 3) transforms from `other` to `reference`: the best shifts at (k,) `turns` [rad].
 
-    `weight` metres in common are outweighed by a metre contradicted.
+    And their (m,) scores [m]: `weight` metres in common are outweighed by a metre contradicted.
     """
     if len(turns) == 0:
-        return np.empty((0, 3))
+        return np.empty((0, 3)), np.empty(0)
     p = parameters
     turned = [other.turned(float(turn)) for turn in turns]
     span = reference.span + np.max([marks.span for marks in turned], axis=0)
@@ -132,24 +132,25 @@ def correlate(
     )
     low, weight = reference.low, weight / 2
     here = _spectra(reference, cell, shape, weight, True)
-    found = []
+    found, scores = [], []
     for turn, marks in zip(turns, turned, strict=True):
         there = _spectra(marks, cell, shape, weight, False)
         score = scipy.fft.ifft2(conjugate_products(here, there), overwrite_x=True)
-        shift = _best_shifts(score, reference.span / cell, p.shifts)
+        best = highest(score, p.shifts)
+        scores.append(score.real.ravel()[best].astype(np.float64))
+        shift = _shifts(best, score.shape, reference.span / cell)
         place = low - marks.low + cell * shift
         found.append(np.column_stack([place, np.full(len(place), turn)]))
-    return np.concatenate(found)
+    return np.concatenate(found), np.concatenate(scores)
 
 
-def _best_shifts(score: Complex64Array, size: FloatArray, count: int) -> FloatArray:
-    """(count, 2) shifts [cells] of the highest score, fewer where there are not as many cells.
+def _shifts(cells: IntArray, shape: tuple[int, ...], size: FloatArray) -> FloatArray:
+    """(n, 2) shifts [cells] that `cells`, by number, stand for.
 
     Those beyond `size` (2,) are negative.
     """
-    best = highest(score, count)
-    shift = np.column_stack(np.unravel_index(best, score.shape)).astype(np.float64)
-    return np.where(shift > size + 1, shift - score.shape, shift)
+    shift = np.column_stack(np.unravel_index(cells, shape)).astype(np.float64)
+    return np.where(shift > size + 1, shift - shape, shift)
 
 
 def _spectra(

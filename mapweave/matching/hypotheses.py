@@ -10,6 +10,7 @@ figures in docs/paper.md). The loop as the paper prints it is `mapweave.fusion.r
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydantic import Field
@@ -50,26 +51,30 @@ class HypothesisParameters(StageParameters):
     count: int = Field(5, ge=2, description="handed on")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class PreparedMap:
-    """A line map with what comparing it takes; made once for each map."""
+    """A line map with what comparing it takes, made once for each map, and when it is asked for."""
 
     lines: LineMap
     raster: DistanceField
-    windows: tuple[Windows, ...]
-    corners: Corners
+    parameters: HypothesisParameters
+
+    @cached_property
+    def windows(self) -> tuple[Windows, ...]:
+        """Stretches of its polylines."""
+        return all_windows(self.lines.segments, self.lines.polyline, self.parameters.windows)
+
+    @cached_property
+    def corners(self) -> Corners:
+        """Pairs of walls that meet."""
+        return find_corners(self.lines.segments, self.parameters.corners)
 
     @classmethod
     def of(
         cls, lines: LineMap, hypotheses: HypothesisParameters, raster: DistanceFieldParameters
     ) -> "PreparedMap":
         """Prepare `lines`, which have at least one segment."""
-        return cls(
-            lines,
-            DistanceField.of(lines, raster),
-            all_windows(lines.segments, lines.polyline, hypotheses.windows),
-            find_corners(lines.segments, hypotheses.corners),
-        )
+        return cls(lines, DistanceField.of(lines, raster), hypotheses)
 
 
 def hypothesise(
@@ -91,7 +96,8 @@ def hypothesise(
     """
     p = parameters
     if proposals is None:
-        proposals = _proposals(reference, other, p, verification)
+        shifted, _ = propose_by_walls(reference, other, p, verification)
+        proposals = propose_all(reference, other, shifted, p)
     if len(proposals) > p.max_proposals:
         few = p.proposal_samples // 4
         first = coarse_scores(reference.raster, other.raster, proposals, few, verification)
@@ -107,15 +113,17 @@ def hypothesise(
     return aligned[kept], scores[kept]
 
 
-def _proposals(
+def propose_by_walls(
     reference: PreparedMap,
     other: PreparedMap,
-    p: HypothesisParameters,
+    parameters: HypothesisParameters,
     verification: VerificationParameters,
-) -> FloatArray:
-    """(n, 3) of windows alike, of corners alike, and of parallel walls."""
-    similar = match_all(reference.windows, other.windows, p.windows)
-    cornered = propose(reference.corners, other.corners, p.corners)
+) -> tuple[FloatArray, FloatArray]:
+    """Return (n, 3) transforms that lay parallel walls on each other, and their (n,) scores [m].
+
+    These are of walls in cells: about what `verify` makes of them, once aligned.
+    """
+    p = parameters
     turns = likely_turns(
         reference.lines.segments, other.lines.segments, p.correlation.turns, p.turn_separation
     )
@@ -124,7 +132,15 @@ def _proposals(
         for shape in (reference, other)
     ]
     weight = verification.contradiction_weight
-    shifted = correlate(marks[0], marks[1], turns, weight, p.correlation)
+    return correlate(marks[0], marks[1], turns, weight, p.correlation)
+
+
+def propose_all(
+    reference: PreparedMap, other: PreparedMap, shifted: FloatArray, p: HypothesisParameters
+) -> FloatArray:
+    """(n, 3) of windows alike, of corners alike, and `shifted`, of parallel walls."""
+    similar = match_all(reference.windows, other.windows, p.windows)
+    cornered = propose(reference.corners, other.corners, p.corners)
     return np.vstack([similar.transform, cornered, shifted])
 
 

@@ -85,6 +85,7 @@ class _OneWay:
     """The samples of one map in the other: (n,) masks and weighted sums."""
 
     coincides: BoolArray
+    contradicts: BoolArray
     distance: FloatArray
     common: float
     contradicted: float
@@ -218,6 +219,16 @@ def coinciding(
     return _one_way(reference, other, transform, parameters).coincides
 
 
+def contradicting(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    parameters: VerificationParameters,
+) -> BoolArray:
+    """Tell which samples (n,) of the walls of `other` lie where `reference` saw free space."""
+    return _one_way(reference, other, transform, parameters).contradicts
+
+
 def _one_way(
     reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
 ) -> _OneWay:
@@ -232,6 +243,7 @@ def _one_way(
     contradicts = through & (other.own_depth < p.clearance)
     return _OneWay(
         coincides,
+        contradicts,
         distance[coincides].astype(np.float64),
         float(other.weight[coincides].sum()),
         float(other.weight[contradicts].sum()),

@@ -9,6 +9,7 @@ from types import ModuleType
 
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError, MissingExtraError
+from mapweave.geometry.arguments import check_kind
 from mapweave.maps import JointMap, RobotMap
 from mapweave.pictures.scene import Scene, joint_scenes, robot_of, robot_scenes, tell_confidence
 
@@ -40,7 +41,12 @@ def plot(
         If `path` has another suffix or cannot be written.
     MissingExtraError
         If matplotlib is not installed.
+    ArgumentError
+        If it is no map, or `maps` are not by robot id.
     """
+    check_kind("some_map", some_map, RobotMap, JointMap)
+    if maps is not None:
+        check_kind("maps", maps, Mapping)
     if isinstance(some_map, RobotMap):
         draw_map(some_map, path, title)
     else:

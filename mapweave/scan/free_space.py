@@ -4,7 +4,7 @@ Matched wall alone accepts look-alike corridors; a wall of one map inside what t
 through refutes them. So a map carries its free space.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
@@ -12,8 +12,16 @@ from pydantic import Field
 from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from mapweave.geometry.arrays import FloatArray
-from mapweave.kernels.clearing import Grid, Sights, clear_cells, from_core, outlines
+from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.kernels.clearing import (
+    Floats32,
+    Grid,
+    Sights,
+    clear_cells,
+    from_core,
+    outlines,
+)
+from mapweave.kernels.matching.rasters import filled_cells
 from mapweave.parameters import StageParameters, derived
 
 
@@ -34,8 +42,10 @@ class FreeSpaceParameters(StageParameters):
         description="[m] of the raster in which it is drawn",
     )
     max_cells: int = Field(4_000_000, gt=0, description="of the raster; larger ones get coarser")
-    simplification: float = Field(
-        0.1, gt=0, description="[m] by which outlines may deviate; below the margin"
+    simplification: float = derived(
+        lambda c: min(0.1, 0.4 * c.mapping.clearance),
+        gt=0,
+        description="[m] by which outlines may deviate; below the margin",
     )
     min_width: float = Field(0.25, ge=0, description="[m] narrower streaks are left out")
     min_area: float = Field(0.1, ge=0, description="[m²] smaller pieces are not worth sending")
@@ -60,7 +70,8 @@ def seen_free(sights: Sights, parameters: FreeSpaceParameters) -> BaseGeometry:
     corners, start = outlines(from_core(free, depth), level)
     found = _with_holes(np.split(low + cell * (corners - 0.5), start[1:-1]) if len(corners) else [])
     # What was opened has no neck so narrow that thinning its outline would close it.
-    simpler = shapely.simplify(found, p.simplification - cell / 2, preserve_topology=False)
+    left = max(p.simplification - cell / 2, 0.0)  # what the raster has not taken already
+    simpler = shapely.simplify(found, left, preserve_topology=False)
     whole = shapely.union_all(shapely.make_valid(simpler))
     return MultiPolygon([q for q in _polygons(whole) if q.area >= p.min_area])
 
@@ -89,25 +100,50 @@ def _with_holes(outlines: list[FloatArray]) -> list[Polygon]:
     return [Polygon(q.exterior, inside) for q, inside in zip(outer, holes, strict=True)]
 
 
-def unite(pieces: Iterable[BaseGeometry], parameters: FreeSpaceParameters) -> BaseGeometry:
-    """Return the union of `pieces`, its outline simplified, crumbs left out.
+def unite(pieces: Sequence[FloatArray], parameters: FreeSpaceParameters) -> BaseGeometry:
+    """Return the union of `pieces`, its outline simplified, streaks and crumbs left out.
+
+    Drawn into a raster, as what scans saw is: what it costs grows with the area, and not with how
+    often that was seen. Only where the area is too large for that, polygons are united.
 
     Parameters
     ----------
     pieces
-        Areas in one frame [m], such as those of several scans.
+        Simple polygons (k, 2) in one frame [m], as maps hold them.
     parameters
         How much an outline is simplified, and what is a crumb.
     """
-    union = shapely.union_all(list(pieces))
+    p = parameters
+    if not any(len(ring) >= 3 for ring in pieces):
+        return MultiPolygon()
+    corners = np.concatenate(pieces)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    rows, columns = (int(n) for n in np.ceil((high - low) / p.cell) + 1)
+    if rows * columns > p.max_cells:
+        return _opened(from_rings(pieces), p)
+    grid = Grid(low, p.cell, rows, columns)
+    return _opened(_outlined(filled_cells(pieces, *grid), grid), p)
+
+
+def _outlined(free: BoolArray, grid: Grid) -> BaseGeometry:
+    """Return what the cells that are `free` cover: the steps of its edge made straight."""
+    taken: Floats32 = np.ones((grid.rows + 2, grid.columns + 2), dtype=np.float32)
+    taken[1:-1, 1:-1] -= free
+    corners, start = outlines(taken, 0.5)
+    places = grid.origin + grid.cell * (corners - 0.5)
+    found = _with_holes(np.split(places, start[1:-1]) if len(corners) else [])
+    smooth = shapely.simplify(found, 0.75 * grid.cell, preserve_topology=False)
+    return shapely.union_all(shapely.make_valid(smooth))
+
+
+def _opened(free: BaseGeometry, p: FreeSpaceParameters) -> BaseGeometry:
+    """Return what is `free`, its outline simplified, streaks and crumbs left out."""
     # Opened: a view through a crack clears nothing that would matter, and costs many vertices.
-    if union.is_empty:
-        return union
-    width = parameters.min_width / 2
+    width = p.min_width / 2
     with np.errstate(invalid="ignore", divide="ignore"):  # GEOS mitres corners of no width at all
-        opened = union.buffer(-width, join_style="mitre").buffer(width, join_style="mitre")
-    union = shapely.simplify(opened, parameters.simplification)
-    return MultiPolygon([p for p in _polygons(union) if p.area >= parameters.min_area])
+        opened = free.buffer(-width, join_style="mitre").buffer(width, join_style="mitre")
+    simpler = shapely.simplify(opened, p.simplification)
+    return MultiPolygon([q for q in _polygons(simpler) if q.area >= p.min_area])
 
 
 def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:

@@ -1,19 +1,21 @@
 """A scan: one sweep of ranges, checked when it is made."""
 
 import math
+import operator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapweave.errors import ArgumentError
-from mapweave.geometry.arguments import as_numbers
+from mapweave.geometry.arguments import as_number, as_numbers
 from mapweave.geometry.arrays import BoolArray, FloatArray
 
 UNNUMBERED = -1
 """The index of a scan that belongs to no log: who maps it counts."""
 
 _TURN = 2 * math.pi
+_LAST_INDEX = 2**53  # that a file holds
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -42,7 +44,7 @@ class Scan:
     Raises
     ------
     ArgumentError
-        If ranges and angles are not of one length, or angles are not as above.
+        If ranges and angles are not of one length, or one of the arguments is not as above.
 
     Examples
     --------
@@ -72,8 +74,8 @@ class Scan:
         keep = object.__setattr__  # only here: the instance is frozen
         keep(self, "ranges", _read_only(returned))
         keep(self, "angles", _owned(directions))
-        keep(self, "index", index)
-        keep(self, "stamp", stamp)
+        keep(self, "index", _index(index))
+        keep(self, "stamp", _stamp(stamp))
         keep(self, "odometry", None if odometry is None else _pose("odometry", odometry))
 
     @classmethod
@@ -107,22 +109,22 @@ class Scan:
         Raises
         ------
         ArgumentError
-            If the angles are not finite, the increment is zero, or the beams go round more than
-            once.
+            If one of them is no number, the angles are not finite, the increment is zero, or the
+            beams go round more than once.
 
         Examples
         --------
         >>> Scan.of([2.0, 2.0, 9.9], angle_min=0.1, angle_increment=-0.1, range_max=9.0).ranges
         array([nan,  2.,  2.])
         """
-        for name, value in (("angle_min", angle_min), ("angle_increment", angle_increment)):
-            if not math.isfinite(value):
-                raise ArgumentError(name, f"expected a finite angle [rad], got {value}")
-        if angle_increment == 0:
+        first, step = _angle("angle_min", angle_min), _angle("angle_increment", angle_increment)
+        if step == 0:
             raise ArgumentError("angle_increment", "expected an angle [rad] other than 0")
+        low = as_number("range_min", range_min, "expected a distance [m]")
+        high = as_number("range_max", range_max, "expected a distance [m]")
         given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
-        used = np.where((given >= range_min) & (given <= range_max), given, np.nan)
-        angles = angle_min + angle_increment * np.arange(given.size, dtype=np.float64)
+        used = np.where((given >= low) & (given <= high), given, np.nan)
+        angles = first + step * np.arange(given.size, dtype=np.float64)
         return cls(used, angles, index, stamp, odometry)
 
     @property
@@ -185,6 +187,35 @@ def _refuse_directions(angles: FloatArray) -> None:
         "expected directions [rad] that ascend from beam to beam, or descend, and do not jump at"
         " half a turn",
     )
+
+
+def _angle(argument: str, value: float) -> float:
+    """Return `value` [rad]; ArgumentError if it is no finite angle."""
+    angle = as_number(argument, value, "expected a finite angle [rad]")
+    if not math.isfinite(angle):
+        raise ArgumentError(argument, f"expected a finite angle [rad], got {value}")
+    return angle
+
+
+def _index(value: int) -> int:
+    """Return `value`; ArgumentError if it numbers no scan."""
+    try:
+        index = operator.index(value)
+    except TypeError:
+        index = UNNUMBERED - 1
+    if not UNNUMBERED <= index <= _LAST_INDEX:
+        raise ArgumentError(
+            "index", f"expected a whole number from 0, or {UNNUMBERED} for none, got {value!r}"
+        )
+    return index
+
+
+def _stamp(value: float) -> float:
+    """Return `value` [s], NaN where it is not finite; ArgumentError if it is no number."""
+    stamp = as_numbers("stamp", value, "expected a time [s]")
+    if stamp.ndim:
+        raise ArgumentError("stamp", f"expected a time [s], got {value!r}")
+    return float(stamp) if np.isfinite(stamp) else math.nan
 
 
 def _pose(argument: str, value: ArrayLike) -> FloatArray:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
+from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.kernels import segmentation
 from mapweave.kernels.segmentation import SegmentationSettings
@@ -77,6 +78,11 @@ def extract_segments(scan: Scan, parameters: SegmentationParameters | None = Non
     ScanSegments
         In the sensor's frame [m], in beam order, with the segment of each beam.
 
+    Raises
+    ------
+    ArgumentError
+        If it is no scan.
+
     Examples
     --------
     >>> import numpy as np
@@ -85,6 +91,7 @@ def extract_segments(scan: Scan, parameters: SegmentationParameters | None = Non
     >>> extract_segments(wall).segments.round(2)
     array([[ 2.  , -1.09,  2.  ,  1.09]])
     """
+    check_kind("scan", scan, Scan)
     p = parameters or SegmentationParameters()
     settings = SegmentationSettings(
         p.max_range,

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.kernels.matching.distinct import agreeing
 from mapweave.maps import LineMap
 from mapweave.shape.windows import Candidates, WindowParameters, Windows, all_windows, match_all
 
@@ -73,17 +73,16 @@ def _agreeing(
     candidates: Candidates, middle: FloatArray, p: CorrespondenceParameters
 ) -> list[tuple[int, IntArray]]:
     """Groups of candidates that agree with their best one, by the arc length that they explain."""
-    place = np.array([se2.transform_points(t, middle) for t in candidates.transform])
-    left = np.ones(len(candidates), dtype=np.bool_)
-    groups: list[tuple[float, int, IntArray]] = []
-    while left.any() and len(groups) < 4 * p.count:
-        best = int(np.flatnonzero(left)[0])  # candidates come best first
-        apart = np.hypot(*(place - place[best]).T)
-        turned = np.abs(se2.wrap(candidates.transform[:, 2] - candidates.transform[best, 2]))
-        members = np.flatnonzero((apart <= p.distance) & (turned <= p.turn))
-        left[members] = False
-        left[best] = False
-        groups.append((float(candidates.score[members].sum()), best, members))
+    x, y, turn = candidates.transform.T
+    c, s = np.cos(turn), np.sin(turn)
+    place = np.column_stack([c * middle[0] - s * middle[1] + x, s * middle[0] + c * middle[1] + y])
+    best, start, members = agreeing(
+        place, np.ascontiguousarray(turn), 4 * p.count, p.distance, p.turn
+    )
+    groups = [
+        (float(candidates.score[group].sum()), first, group)
+        for first, group in zip(best.tolist(), np.split(members, start[1:-1]), strict=True)
+    ]
     groups.sort(key=lambda group: -group[0])
     return [(best, members) for _, best, members in groups[: p.count]]
 

@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from mapweave.kernels.matching.windows import WindowSamples, alike_windows
+from mapweave.kernels.matching.windows import WindowSamples, alike_windows, sample_windows
 
 
 class WindowParameters(BaseModel):
@@ -166,14 +166,9 @@ def windows(
     """
     steps = segments[:, 2:] - segments[:, :2]
     lengths = np.hypot(steps[:, 0], steps[:, 1])
-    ends = np.cumsum(lengths)  # one arc length for the whole map; no window crosses polylines
+    # One arc length for the whole map; no window crosses polylines.
     owner, offset, arc = _starts(polyline, lengths, length, stride)
-    at = (offset + arc)[:, None] + length * (np.arange(samples) + 0.5) / samples
-    segment = np.minimum(np.searchsorted(ends, at, side="right"), len(ends) - 1)
-    unit = steps / np.where(lengths > 0, lengths, 1)[:, None]
-    along = at - (ends - lengths)[segment]
-    points = segments[segment, :2] + along[..., None] * unit[segment]
-    codes = (unit[:, 0] + 1j * unit[:, 1])[segment]
+    codes, points = sample_windows(segments, offset + arc, length, samples)
     return Windows(length, codes, points, owner, arc)
 
 

@@ -23,6 +23,7 @@ from mapweave.reasons import Pair, Reason, ReasonKind, Status, StatusKind
 from mapweave.team.consistency import ConsistencyParameters, bits, explain
 from mapweave.team.contradictions import (
     ContradictionParameters,
+    KnownVerdicts,
     MapContradictions,
     PairVerdict,
     PairVerdicts,
@@ -63,6 +64,7 @@ def cluster_components(
     alignments: Sequence[Alignment],
     parameters: AlignmentGraphParameters,
     rasters: Mapping[str, DistanceField] | None = None,
+    verdicts: KnownVerdicts | None = None,
 ) -> tuple[list[Cluster], tuple[Alignment, ...]]:
     """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
 
@@ -76,10 +78,12 @@ def cluster_components(
         The maps of those components that have seen any wall, each in its frame: they object to
         alignments that contradict them. What alignments differ by is measured at the maps'
         middles, because that depends on no frame; without a map, at the component's origin.
+    verdicts
+        Of maps about each other, those of versions before among them.
     """
     known = set(names)
     alignments = [a for a in alignments if a.reference in known and a.other in known]
-    graph = _Graph(names, alignments, parameters, rasters or {})
+    graph = _Graph(names, alignments, parameters, rasters or {}, verdicts)
     judged = tuple(graph.judge(alignment) for alignment in alignments)
     return sorted(graph.clusters(), key=lambda c: -len(c.poses)), judged
 
@@ -93,6 +97,7 @@ class _Graph:
         alignments: Sequence[Alignment],
         parameters: AlignmentGraphParameters,
         rasters: Mapping[str, DistanceField],
+        verdicts: KnownVerdicts | None,
     ) -> None:
         self._names, self._parameters = names, parameters
         self._number = {name: number for number, name in enumerate(names)}
@@ -104,7 +109,7 @@ class _Graph:
         self._edges = [self._edge(link) for link in links]
         self._rigid = [_rigid(link) for link in links]
         seen = {self._number[name]: raster for name, raster in rasters.items()}
-        witnesses = PairVerdicts(seen, self._middles, parameters.contradictions)
+        witnesses = PairVerdicts(seen, self._middles, parameters.contradictions, verdicts)
         self._doubts = MapContradictions(len(names), self._edges, witnesses)
         p = parameters.explanations
         self._explanations = explain(len(names), self._edges, p, self._doubts)
@@ -210,15 +215,14 @@ class _Graph:
     def _with_bridges(self, inside: Sequence[int]) -> Iterator[tuple[Edge, bool]]:
         """Yield the edges `inside`, and of each whether all hangs on it: nothing can refute it."""
         count = len(self._names)
-        parts = len(groups(count, self._edges, inside))
         _, paths = poses_along(self._edges[inside[0]].first, count, self._edges, inside)
+        cycles = 0  # the edges in any: those in one that an edge closes with the paths to its ends
         for k in inside:
-            is_needed = any(path > 0 and path >> k & 1 for path in paths)
-            rest = [other for other in inside if other != k]
-            yield (
-                self._edges[k],
-                is_needed and len(groups(count, self._edges, rest)) > parts,
-            )
+            closing = paths[self._edges[k].first] ^ paths[self._edges[k].second]
+            if closing != 1 << k:
+                cycles |= closing | 1 << k
+        for k in inside:
+            yield self._edges[k], not cycles >> k & 1
 
 
 def _place(link: Alignment) -> float:

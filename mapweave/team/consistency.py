@@ -23,6 +23,7 @@ from typing import NamedTuple, Protocol
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.team.cycles import CycleParameters, Edge, bad_cycles, bad_cycles_through
+from mapweave.team.min_cut import Union
 
 
 class ConsistencyParameters(BaseModel):
@@ -197,21 +198,12 @@ class _Search:
 
     def _independent_cycles(self, removed: int) -> int:
         """How many of the edges that are left close a cycle."""
-        group = list(range(self._count))
-
-        def root(node: int) -> int:
-            while group[node] != node:
-                group[node] = group[group[node]]
-                node = group[node]
-            return node
-
-        closing = 0
-        for k, edge in enumerate(self._edges):
-            if not removed >> k & 1:
-                a, b = root(edge.first), root(edge.second)
-                closing += a == b
-                group[a] = b
-        return closing
+        union = Union(self._count)
+        return sum(
+            not union.join(edge.first, edge.second)
+            for k, edge in enumerate(self._edges)
+            if not removed >> k & 1
+        )
 
     def _remove_greedily(self, removed: int) -> _Candidate:
         """Remove what is in most cycles until all close; then bring back what still agrees."""

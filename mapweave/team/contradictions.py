@@ -7,6 +7,8 @@ saw through speak against one of the alignments between them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import inf
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +20,7 @@ from mapweave.matching.verification import Verdict, VerificationParameters, veri
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.cycles import Edge, poses_along
 from mapweave.team.min_cut import groups
+from mapweave.team.recent import Recent
 
 
 class ContradictionParameters(StageParameters):
@@ -40,6 +43,11 @@ class ContradictionParameters(StageParameters):
     )
     step: float = Field(0.1, gt=0, description="[m] poses nearer to each other are judged once")
     turn_step: float = Field(0.01, gt=0, description="[rad] as well")
+
+
+# By both rasters, and the transform in thousandths of the steps.
+KnownVerdicts: TypeAlias = Recent[tuple[DistanceField, DistanceField, int, int, int], Verdict]
+PARTS = 1000  # of a step, to which a transform is rounded when it is judged
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +79,8 @@ class PairVerdicts:
         Of each component that has seen any wall, in its frame.
     frames
         (n, 3) of the graph's nodes in the components' frames.
+    known
+        What rasters said before, of transforms rounded so finely that it does not matter.
     """
 
     def __init__(
@@ -78,28 +88,45 @@ class PairVerdicts:
         rasters: Mapping[int, DistanceField],
         frames: FloatArray,
         parameters: ContradictionParameters,
+        known: KnownVerdicts | None = None,
     ) -> None:
         self._rasters, self._frames, self._p = rasters, frames, parameters
+        self._verdicts: KnownVerdicts = Recent() if known is None else known
         self._known: dict[tuple[int, ...], PairVerdict | None] = {}
         self._reach = {k: _reach(raster, frames[k]) for k, raster in rasters.items()}
 
-    def ask(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
-        """Return what speaks against `transform` (3,) of node `second` in the frame of `first`."""
-        if first not in self._rasters or second not in self._rasters:
-            return None
-        if np.hypot(*transform[:2]) > self._reach[first] + self._reach[second]:
-            return None
+    def ask(self, pairs: Sequence[tuple[int, int]], transforms: FloatArray) -> list[PairVerdict]:
+        """Return what speaks against transforms (n, 3), each of a pair's second to its first."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
-        key = (first, second, *(int(v) for v in np.round(transform / steps)))
-        if key not in self._known:
-            self._known[key] = self._judge(first, second, transform)
-        return self._known[key]
+        keys = np.round(transforms / steps).astype(np.int64).tolist()
+        rounded = np.round(transforms / (steps / PARTS)).astype(np.int64).tolist()
+        apart = np.hypot(transforms[:, 0], transforms[:, 1]).tolist()
+        found = []
+        for k, (first, second) in enumerate(pairs):
+            # What has seen no wall says nothing, nor do two that are too far apart.
+            if apart[k] > self._reach.get(first, -inf) + self._reach.get(second, -inf):
+                continue
+            key = (first, second, *keys[k])
+            if key not in self._known:
+                self._known[key] = self._judge(first, second, rounded[k])
+            verdict = self._known[key]
+            if verdict is not None:
+                found.append(verdict)
+        return found
 
-    def _judge(self, first: int, second: int, transform: FloatArray) -> PairVerdict | None:
+    def _judge(self, first: int, second: int, at: Sequence[int]) -> PairVerdict | None:
+        """Judge the transform that lies `at` so many parts of the steps."""
         p = self._p
-        there = se2.compose(transform, se2.inverse(self._frames[second]))
-        pose = se2.compose(self._frames[first], there)
-        verdict = verify(self._rasters[first], self._rasters[second], pose, p.verification)
+        one, other = self._rasters[first], self._rasters[second]
+        x, y, turn = at
+
+        def judge() -> Verdict:
+            rounded = np.array(at) * np.array([p.step, p.step, p.turn_step]) / PARTS
+            there = se2.compose(rounded, se2.inverse(self._frames[second]))
+            pose = se2.compose(self._frames[first], there)
+            return verify(one, other, pose, p.verification)
+
+        verdict = self._verdicts.get((one, other, x, y, turn), judge)
         allowed = p.allowance * (max(verdict.common, 0.0) + verdict.contradicted)
         excess = verdict.contradicted - allowed
         return (
@@ -125,14 +152,15 @@ class MapContradictions:
 
     def against(self, present: Sequence[int]) -> list[PairVerdict]:
         """Return all that speaks against the edges `present`."""
-        found = []
+        found: list[PairVerdict] = []
         for group in groups(self._count, self._edges, present):
             if len(group) == 1:
                 continue
             poses, _ = poses_along(group[0], self._count, self._edges, present)
-            for a, b in combinations(group, 2):
-                found.append(self._witnesses.ask(a, b, se2.between(poses[a], poses[b])))
-        return [witness for witness in found if witness is not None]
+            pairs = list(combinations(group, 2))
+            first, second = np.array(pairs).T
+            found += self._witnesses.ask(pairs, se2.between(poses[first], poses[second]))
+        return found
 
 
 def _reach(raster: DistanceField, frame: FloatArray) -> float:

@@ -4,14 +4,19 @@ Pairwise consistency (Mangelson et al. 2018, ICRA) carried over to a graph: the 
 cycle of right alignments compose to the identity, but for what each of them errs by.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+
+Pose: TypeAlias = tuple[float, float, float]
 
 LIKELY = 2.45  # standard deviations along x and y, within which 19 of 20 are
 
@@ -28,7 +33,7 @@ class CycleParameters(BaseModel):
     max_cycles: int = Field(400, ge=1, description="looked at in one go, the shortest")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Edge:
     """An alignment as the edge of a graph.
 
@@ -49,6 +54,18 @@ class Edge:
     transform: FloatArray
     confidence: float
     bend: float = 0.0
+
+    @cached_property
+    def forth(self) -> Pose:
+        """The transform as numbers."""
+        x, y, turn = self.transform.tolist()
+        return x, y, turn
+
+    @cached_property
+    def back(self) -> Pose:
+        """Its inverse as numbers."""
+        x, y, turn = se2.inverse(self.transform).tolist()
+        return x, y, turn
 
 
 def bad_cycles(count: int, edges: Sequence[Edge], removed: int, p: CycleParameters) -> list[int]:
@@ -84,8 +101,8 @@ def poses_along(
     for k in present:
         steps[edges[k].first].append(k)
         steps[edges[k].second].append(k)
-    poses, paths = np.full((count, 3), np.nan), [-1] * count
-    poses[root], paths[root] = 0.0, 0
+    poses, paths = [(math.nan, math.nan, math.nan)] * count, [-1] * count
+    poses[root], paths[root] = (0.0, 0.0, 0.0), 0
     reached = [root]
     for here in reached:  # grows meanwhile: nodes in the order of their steps from the root
         for k in steps[here]:
@@ -93,11 +110,18 @@ def poses_along(
             forward = edge.first == here
             there = edge.second if forward else edge.first
             if paths[there] < 0:
-                step = edge.transform if forward else se2.inverse(edge.transform)
-                poses[there] = se2.compose(poses[here], step)
+                poses[there] = _stepped(poses[here], edge.forth if forward else edge.back)
                 paths[there] = paths[here] | 1 << k
                 reached.append(there)
-    return poses, paths
+    return np.array(poses).reshape(count, 3), paths
+
+
+def _stepped(pose: Pose, step: Pose) -> Pose:
+    """`se2.compose` of two single poses, of which there are thousands."""
+    (x, y, turn), (dx, dy, more) = pose, step
+    c, s = math.cos(turn), math.sin(turn)
+    angle = math.pi - (math.pi - turn - more) % (2 * math.pi)
+    return x + c * dx - s * dy, y + s * dx + c * dy, angle
 
 
 def misfit(transform: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
@@ -116,18 +140,26 @@ def bad_cycles_through(
     closing = [k for k in here if masks[k]]
     if not closing:
         return []
-    transforms = np.array([edges[k].transform for k in closing])
+    transforms = np.array([edges[k].forth for k in closing])
     first = poses[[edges[k].first for k in closing]]
     second = poses[[edges[k].second for k in closing]]
     off = misfit(transforms, first, second)
     # Errors of independent alignments add up as their squares do.
     length = np.array([masks[k].bit_count() / 3 for k in closing])
-    bent = np.array([_bent(edges, masks[k]) for k in closing])
-    bad = np.sum(off[:, :2] ** 2, axis=1) > p.max_distance**2 * length + bent
-    bad |= np.abs(off[:, 2]) > p.max_turn * np.sqrt(length)
-    return [masks[k] for k, is_bad in zip(closing, bad, strict=True) if is_bad]
+    beyond = np.sum(off[:, :2] ** 2, axis=1) - p.max_distance**2 * length
+    turned = np.abs(off[:, 2]) > p.max_turn * np.sqrt(length)
+    return [
+        masks[closing[at]]
+        for at in np.flatnonzero((beyond > 0) | turned).tolist()
+        if turned[at] or beyond[at] > _bent(edges, masks[closing[at]])
+    ]
 
 
 def _bent(edges: Sequence[Edge], mask: int) -> float:
     """[m²] that bends may add to what the cycle of the edges in `mask` misses by, squared."""
-    return sum((LIKELY * edge.bend) ** 2 for k, edge in enumerate(edges) if mask >> k & 1)
+    squares = 0.0
+    while mask:
+        k = mask.bit_length() - 1
+        squares += (LIKELY * edges[k].bend) ** 2
+        mask ^= 1 << k
+    return squares

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from mapweave.team.consistency import ConsistencyParameters, ConsistentSet
 from mapweave.team.cycles import Edge
-from mapweave.team.min_cut import groups, weakest_cut_of_all
+from mapweave.team.min_cut import Union, groups, weakest_cut_of_all
 
 CERTAIN = 1e-6  # least doubt in an alignment that is counted
 MAX_UNDECIDED = 0.5 + 1e-6  # an even chance, rounding included, decides nothing
@@ -50,14 +50,15 @@ def component_confidence(
     """
     if len(group) == 1:
         return 1.0
+    inside = set(group)
     strengths = {
         k: max(_log_odds(edges[k]) + parameters.cycle_gain, 0.0)
-        for k in right
-        if edges[k].first in group
+        for k in sorted(right)
+        if edges[k].first in inside
     }
     cut = weakest_cut_of_all(group, edges, strengths)
     share = _share(group, count, edges, right, explanations)
-    against = (1 - share) / share + math.exp(parameters.cycle_gain - cut.strength)
+    against = (1 - share) / share + math.exp(parameters.cycle_gain - cut)
     return 1 / (1 + against)
 
 
@@ -79,10 +80,12 @@ def weakest_link(
     """
     if len(group) == 1:
         return 1.0
-    kept: list[int] = []
+    inside = set(group)
+    union, missing = Union(count), len(group) - 1
     for k in sorted(right, key=lambda k: -worth[k]):
-        kept.append(k)
-        if list(group) in groups(count, edges, kept):
+        if union.join(edges[k].first, edges[k].second) and edges[k].first in inside:
+            missing -= 1
+        if missing == 0:
             return worth[k]
     raise ValueError(f"expected edges that hold {list(group)} together")
 

@@ -6,7 +6,6 @@ robust pose graph over all robots' submaps takes what is found. The robots' maps
 bend by as much; which robots are joined, and how sure that is, was decided before.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -20,7 +19,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle_of_path
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.mapping.submap_graph import joining_covariance, tracking_covariance
-from mapweave.maps import Alignment, LineMap, Submap, Trajectory, lines_of
+from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.alignment_graph import Cluster
 
@@ -90,8 +89,10 @@ class JointOptimizer:
         cluster: Cluster,
         submaps: Mapping[str, Sequence[Submap]],
         alignments: Sequence[Alignment],
-    ) -> tuple[Cluster, dict[str, LineMap]]:
-        """Return `cluster` with the poses that fit best, and each component's lines, bent to fit.
+    ) -> tuple[Cluster, dict[str, FloatArray]]:
+        """Return `cluster` with the poses that fit best, and where submaps lie in their components.
+
+        These are (k, 3), of each component's submaps in their order, in its frame.
 
         Parameters
         ----------
@@ -105,7 +106,7 @@ class JointOptimizer:
         ]
         closures = list(self._closures(nodes))
         if not closures:
-            return cluster, {name: lines_of(submaps[name]) for name in cluster.poses}
+            return cluster, {name: _believed(submaps[name]) for name in cluster.poses}
         links = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments), *closures]
         fitted, _ = optimise(np.array([n.submap.pose for n in nodes]), links)
         return _rooted(cluster, nodes, fitted)
@@ -131,29 +132,37 @@ class JointOptimizer:
         p = self._p
         loose = np.array([p.alignment_sigma, p.alignment_sigma, p.alignment_turn])
         covariance = np.diag(loose**2)
-        for a in alignments:
-            ours, theirs = (_of(nodes, name) for name in (a.reference, a.other))
-            if a.decision != "accepted" or not (ours and theirs):
-                continue
-            i, j = min(
-                ((i, j) for i in ours for j in theirs), key=lambda pair: _apart(nodes, *pair)
+        inside = _by_component(nodes)
+        relied = [
+            a
+            for a in alignments
+            if a.decision == "accepted" and inside.get(a.reference) and inside.get(a.other)
+        ]
+        if not relied:
+            return
+        ends = [_nearest(nodes, inside[a.reference], inside[a.other]) for a in relied]
+        poses = np.array([n.submap.pose for n in nodes])
+        first, second = (
+            se2.between(np.array([cluster.poses[n] for n in names]), poses[list(those)])
+            for names, those in (
+                ([a.reference for a in relied], [i for i, _ in ends]),
+                ([a.other for a in relied], [j for _, j in ends]),
             )
-            frames = cluster.poses[a.reference], cluster.poses[a.other]
-            first, second = (
-                se2.between(frame, nodes[k].submap.pose)
-                for frame, k in zip(frames, (i, j), strict=True)
-            )
-            step = se2.between(first, se2.compose(a.transform, second))
+        )
+        there = se2.compose(np.array([a.transform for a in relied]), second)
+        for (i, j), step in zip(ends, se2.between(first, there), strict=True):
             yield Constraint(i, j, step, covariance, True)
 
     def _closures(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
         """Yield how submaps lie to each other that saw the same walls."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
         left = self._p.at_once
-        for first, second in self._candidates(nodes):
-            older, newer = nodes[first].submap, nodes[second].submap
-            x, y, turn = np.round(se2.between(older.pose, newer.pose) / steps).astype(int).tolist()
-            asked = _Compared(older.map, newer.map, x, y, turn)
+        pairs = list(self._candidates(nodes))
+        poses = np.array([n.submap.pose for n in nodes])
+        older, newer = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        between = np.round(se2.between(poses[older], poses[newer]) / steps).astype(np.int64)
+        for (first, second), about in zip(pairs, between.tolist(), strict=True):
+            asked = _Compared(nodes[first].submap.map, nodes[second].submap.map, *about)
             if asked not in self._known and left > 0:
                 left -= 1
                 self._remember(asked)
@@ -171,14 +180,18 @@ class JointOptimizer:
         """Yield pairs of nodes near each other that tracking does not link."""
         p = self._p
         compared = [k for k in self._finished(nodes) if len(nodes[k].submap.map.segments)]
-        for k in compared:
+        middles = np.array([nodes[k].middle for k in compared]).reshape(-1, 2)
+        for last, k in enumerate(compared):
+            apart = np.hypot(*(middles[:last] - middles[last]).T)
             near: dict[str, list[tuple[float, int]]] = {}
-            for j in (j for j in compared if j < k and not _is_tracked(nodes, j, k)):
-                near.setdefault(nodes[j].component, []).append((_apart(nodes, j, k), j))
+            for at in np.flatnonzero(apart < p.reach).tolist():
+                j = compared[at]
+                if not _is_tracked(nodes, j, k):
+                    near.setdefault(nodes[j].component, []).append((float(apart[at]), j))
             nearest = sorted(
                 pair for those in near.values() for pair in sorted(those)[: p.candidates]
             )
-            yield from ((j, k) for distance, j in nearest[: p.most] if distance < p.reach)
+            yield from ((j, k) for _, j in nearest[: p.most])
 
     def _finished(self, nodes: Sequence[_Node]) -> list[int]:
         """Return the nodes without the newest of each component, unless that is its only one."""
@@ -199,6 +212,11 @@ class JointOptimizer:
         return self._loops.compare_two(older, newer, 0.0).link
 
 
+def _believed(submaps: Sequence[Submap]) -> FloatArray:
+    """(k, 3) poses of submaps in their component, as their robot has them."""
+    return np.array([s.pose for s in submaps]).reshape(-1, 3)
+
+
 def _follows(one: _Node, other: _Node) -> bool:
     """Whether the second was finished right after the first."""
     return other.submap.id == one.submap.id + 1
@@ -210,34 +228,38 @@ def _is_tracked(nodes: Sequence[_Node], first: int, second: int) -> bool:
     return one.component == other.component and _follows(one, other)
 
 
-def _of(nodes: Sequence[_Node], component: str) -> list[int]:
-    return [k for k, node in enumerate(nodes) if node.component == component]
+def _by_component(nodes: Sequence[_Node]) -> dict[str, list[int]]:
+    inside: dict[str, list[int]] = {}
+    for k, node in enumerate(nodes):
+        inside.setdefault(node.component, []).append(k)
+    return inside
 
 
-def _apart(nodes: Sequence[_Node], first: int, second: int) -> float:
-    """[m] between the middles of two submaps."""
-    return math.dist(nodes[first].middle, nodes[second].middle)
+def _nearest(nodes: Sequence[_Node], ours: Sequence[int], theirs: Sequence[int]) -> tuple[int, int]:
+    """Return the two, one of each, whose middles are nearest to each other."""
+    here, there = (np.array([nodes[k].middle for k in those]) for those in (ours, theirs))
+    apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
+    i, j = np.unravel_index(int(apart.argmin()), apart.shape)
+    return ours[int(i)], theirs[int(j)]
 
 
 def _rooted(
     cluster: Cluster, nodes: Sequence[_Node], fitted: FloatArray
-) -> tuple[Cluster, dict[str, LineMap]]:
-    """Return where components are as wholes, the first at the origin, and their lines.
+) -> tuple[Cluster, dict[str, FloatArray]]:
+    """Return where components are as wholes, the first at the origin, and their submaps in them.
 
     Parameters
     ----------
     fitted
         (n, 3) where the nodes fit [m, m, rad].
     """
-    poses, lines = {}, {}
+    poses, own, by_component = {}, {}, _by_component(nodes)
     for name, frame in cluster.poses.items():
-        inside = _of(nodes, name)
-        before = np.array([se2.between(frame, nodes[k].submap.pose) for k in inside])
+        inside = by_component[name]
+        before = se2.between(frame, np.array([nodes[k].submap.pose for k in inside]))
         poses[name] = se2.fit(before, fitted[inside])
-        own = se2.between(poses[name], fitted[inside])
-        maps = [nodes[k].submap.map for k in inside]
-        lines[name] = LineMap.union([m.moved(pose) for m, pose in zip(maps, own, strict=True)])
+        own[name] = se2.between(poses[name], fitted[inside])
     first, root = next(iter(poses.items()))
     rooted = {name: se2.between(root, pose) for name, pose in poses.items()}
     rooted[first] = np.zeros(3)
-    return replace(cluster, poses=rooted), lines
+    return replace(cluster, poses=rooted), own

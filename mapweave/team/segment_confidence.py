@@ -30,7 +30,7 @@ class SegmentConfidenceParameters(StageParameters):
 
 def segment_confidence(
     lines: LineMap,
-    views: Sequence[tuple[DistanceField, FloatArray]],
+    views: Sequence[Sequence[tuple[DistanceField, FloatArray]]],
     parameters: SegmentConfidenceParameters,
 ) -> FloatArray:
     """Return (n,) in [0, 1]: more with every scan and map that saw it, less with every denial.
@@ -41,16 +41,20 @@ def segment_confidence(
     Parameters
     ----------
     views
-        The maps that were joined, each with its (3,) pose in the frame of `lines`.
+        The maps that were joined, each of one piece or more with its (3,) pose in the frame of
+        `lines`. A map has one voice: where one piece has a wall and another saw through, the wall.
     """
     if len(lines.segments) == 0:
         return np.empty(0)
     oriented, owner = points_on_lines(lines, parameters.spacing)
     confirm, deny = np.zeros(len(oriented)), np.zeros(len(oriented))
-    for raster, pose in views:
-        near, through = _vote(raster, pose, oriented, parameters)
+    for pieces in views:
+        near = np.zeros(len(oriented), dtype=np.bool_)
+        through = near.copy()
+        for raster, pose in pieces:
+            _vote(raster, pose, oriented, (near, through), parameters)
         confirm += near
-        deny += through
+        deny += through & ~near
     # What nobody confirms at this very place was merged from walls close by: one voice for it.
     left = np.maximum(confirm, 1) / (np.maximum(confirm, 1) + deny)
     agreed = np.bincount(owner, weights=left) / np.bincount(owner)
@@ -61,10 +65,16 @@ def _vote(
     raster: DistanceField,
     pose: FloatArray,
     oriented: OrientedPoints,
+    said: tuple[BoolArray, BoolArray],
     p: SegmentConfidenceParameters,
-) -> tuple[BoolArray, BoolArray]:
-    """(n,) masks: where the map has a wall itself, and where it saw through instead."""
-    own = se2.transform_points(se2.inverse(pose), oriented.points)
-    _, distance, depth = raster.look_up(own)
-    near = distance <= p.closeness
-    return near, ~near & (depth > p.clearance)
+) -> None:
+    """Add to two masks (n,) where the piece has a wall itself, and where it saw through instead."""
+    near, through = said
+    index = (se2.transform_points(se2.inverse(pose), oriented.points) - raster.origin) / raster.cell
+    rows, columns = raster.distance.shape
+    i, j = index[:, 0], index[:, 1]
+    inside = np.flatnonzero((i >= 0) & (j >= 0) & (i < rows) & (j < columns))
+    cells = i[inside].astype(np.int64), j[inside].astype(np.int64)
+    walls = raster.distance[cells] <= p.closeness
+    near[inside[walls]] = True
+    through[inside[~walls & (raster.depth[cells] > p.clearance)]] = True

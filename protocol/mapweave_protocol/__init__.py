@@ -15,12 +15,20 @@ from typing import TYPE_CHECKING
 from mapweave.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from mapweave_protocol.link.subscriber import alignments, joint_maps, robot_maps, statuses
+    from mapweave_protocol.link.subscriber import (
+        alignments,
+        joint_maps,
+        poses,
+        robot_maps,
+        statuses,
+    )
 
 _SUBSCRIBER = "mapweave_protocol.link.subscriber"
-_MODULES = dict.fromkeys(("alignments", "joint_maps", "robot_maps", "statuses"), _SUBSCRIBER)
+_MODULES = dict.fromkeys(
+    ("alignments", "joint_maps", "poses", "robot_maps", "statuses"), _SUBSCRIBER
+)
 
 if not TYPE_CHECKING:  # who checks types knows the names from above
     __getattr__, __dir__ = lazy_names(__name__, _MODULES)
 
-__all__ = ["alignments", "joint_maps", "robot_maps", "statuses"]
+__all__ = ["alignments", "joint_maps", "poses", "robot_maps", "statuses"]

@@ -33,9 +33,9 @@ class EndpointError(MapweaveError):
     """An endpoint that is not one."""
 
     def __init__(self, endpoints: tuple[str, ...]) -> None:
+        given = ", ".join(map(str, endpoints)) or "(none)"
         super().__init__(
-            f"endpoint {', '.join(endpoints)}: expected a protocol, host and port,"
-            " such as tcp/localhost:7447"
+            f"endpoint {given}: expected a protocol, host and port, such as tcp/localhost:7447"
         )
         self.endpoints = endpoints
 

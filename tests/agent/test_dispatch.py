@@ -7,6 +7,7 @@ from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.dispatch import Dispatcher
+from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_protocol.link.inbox import Arrival
@@ -59,7 +60,7 @@ class Robot:
     def __init__(self, name: str) -> None:
         self.plan = ComparisonSchedule(name, AgentParameters())
         self.plan.own_map(a_map(name), finished=True)
-        self._dispatcher = Dispatcher(name, "x", self.plan, Needs(name))
+        self._dispatcher = Dispatcher(name, "x", self.plan, Needs(name), Whereabouts(name, "x", 0))
 
     def hears(self, *arrivals: Arrival) -> None:
         """Take in what arrives, in this order."""

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -10,16 +11,19 @@ import numpy as np
 import pytest
 
 import mapweave_agent
-from mapweave.errors import ArgumentError, InvalidIdError
+from mapweave.errors import ArgumentError, FileError, InvalidIdError
 from mapweave.io.readers import read_scans
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
+from mapweave_agent.agent import AgentRun
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
+from mapweave_protocol.wire.coding.trajectory_code import PER_METRE
+from mapweave_protocol.wire.messages import PoseMessage
 from tests.agent.test_agent import MAPWEAVE, PATIENCE, SCANS, Listener
 
-HALF_A_STEP = 0.0126  # [m] of the poses of scans on the wire
+HALF_A_STEP = 0.501 / PER_METRE  # [m] of the poses of scans on the wire
 
 
 def scans_of(log: Path) -> list[Scan]:
@@ -55,6 +59,7 @@ def test_lines_on_standard_input_are_mapped_as_their_log_is(
 ) -> None:
     scans = scans_of(logs[0])
     where = ["--robot", "a", "--team", team, "--connect", endpoint, "--source", "-"]
+    where += ["--rate", "max"]
     with open_session([endpoint], patience=PATIENCE) as session:
         listener = Listener(session, team)
         with subprocess.Popen(
@@ -101,6 +106,77 @@ def test_a_program_feeds_an_agent_and_its_map_is_complete_when_the_block_ends(
         listener.until(lambda: listener.finished("a"))
     assert agent.skipped == 0
     assert_mapped(listener.maps["a"], scans)
+
+
+def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans, told, all_told = scans_of(logs[0]), list[PoseMessage](), threading.Event()
+
+    def tell(pose: PoseMessage) -> None:
+        told.append(pose)
+        if pose.scan_index == len(scans) - 1:
+            all_told.set()
+
+    with mapweave_agent.Agent(
+        "a", team, connect=endpoint, patience=PATIENCE, on_pose=tell
+    ) as agent:
+        for index, scan in enumerate(scans):
+            agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+            while agent.waiting or (told and told[-1].scan_index < index):
+                time.sleep(0.005)
+        assert all_told.wait(PATIENCE)
+    mapper, heard = Mapper("a"), {pose.scan_index: pose for pose in told}
+    assert sorted(heard) == list(range(told[0].scan_index, len(scans)))  # who subscribes is late
+    for index, scan in enumerate(scans):
+        placement = mapper.add(scan)
+        if index in heard and placement.pose is not None:
+            assert (heard[index].found, heard[index].component) == (True, "a/0")
+            np.testing.assert_allclose(np.array(heard[index].pose), placement.pose, atol=6e-5)
+
+
+def test_scans_are_mapped_while_the_agent_is_held_up_with_everything_else(
+    endpoint: str, team: str, logs: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held_up, told = threading.Event(), list[int]()
+    attend = AgentRun._attend
+
+    def held(run: AgentRun, wait: float) -> None:
+        held_up.wait(PATIENCE)
+        attend(run, wait)
+
+    monkeypatch.setattr(AgentRun, "_attend", held)
+    with mapweave_agent.Agent(
+        "a", team, connect=endpoint, patience=PATIENCE, on_pose=lambda p: told.append(p.scan_index)
+    ) as agent:
+        for scan in scans_of(logs[0]):
+            agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+            while agent.waiting:
+                time.sleep(0.005)
+        deadline = time.monotonic() + PATIENCE
+        while SCANS - 1 not in told and time.monotonic() < deadline:
+            time.sleep(0.01)
+        held_up.set()
+    assert told[-1] == SCANS - 1
+    assert agent.skipped == 0
+
+
+def test_what_fails_beside_the_mapping_ends_the_agent(
+    endpoint: str, team: str, logs: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: AgentRun, *, complete: bool) -> None:
+        raise FileError("state", f"is full ({complete})")
+
+    monkeypatch.setattr(AgentRun, "_publish_map", fail)
+
+    def feed_all() -> None:
+        with mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE) as agent:
+            for scan in scans_of(logs[0]):
+                agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0])
+                time.sleep(0.05)
+
+    with pytest.raises(FileError, match="state: is full"):
+        feed_all()
 
 
 def test_what_is_no_scan_is_refused_where_it_is_fed(endpoint: str, team: str) -> None:

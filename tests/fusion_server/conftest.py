@@ -176,8 +176,15 @@ class Watcher:
 
     def next(self) -> JointMap:
         """Return the next version."""
-        arrival = self._inbox.get(PATIENCE)
-        assert arrival is not None, "no joint map came"
+        joint = self.within(PATIENCE)
+        assert joint is not None, "no joint map came"
+        return joint
+
+    def within(self, seconds: float) -> JointMap | None:
+        """Return the next version, None if there is none within so long."""
+        arrival = self._inbox.get(seconds)
+        if arrival is None:
+            return None
         message = self._reader.read(arrival)
         assert message is not None
         return message.unpack()

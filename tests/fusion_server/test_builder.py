@@ -4,21 +4,20 @@ import time
 
 from mapweave.config import Config, Mapping
 from mapweave.maps import JointMap
-from mapweave.team.joint_map import JointParameters
-from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.joining import JointParameters
+from mapweave.team.joint_builder import JointMapBuilder
 from mapweave_fusion_server.builder import VersionBuilder
 from mapweave_fusion_server.coordinator import Draft
 
-GIVEN: list[JointParameters | None] = []
+GIVEN: list[JointParameters] = []
 
 
 class Noting(Draft):
     """A draft that notes what it is built with."""
 
-    def build(self, weaver: JointOptimizer, parameters: JointParameters | None = None) -> JointMap:
+    def build(self, builder: JointMapBuilder) -> JointMap:
         """Return a map of nothing."""
-        assert isinstance(weaver, JointOptimizer)
-        GIVEN.append(parameters)
+        GIVEN.append(builder.parameters)
         return JointMap(self.version, (), ())
 
 

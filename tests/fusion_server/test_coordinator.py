@@ -11,7 +11,7 @@ import pytest
 
 from mapweave.geometry import se2
 from mapweave.maps import JointMap, RobotMap
-from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.joint_builder import JointMapBuilder
 from mapweave_fusion_server.coordinator import (
     MAX_RUNS,
     Coordinator,
@@ -49,7 +49,7 @@ def test_the_furthest_alignment_that_may_arrive_makes_a_version_that_can_be_sent
     for robot_map in maps:
         coordinator.receive_map(robot_map)
     coordinator.receive_alignments(make_alignments(*maps, transform=(WORLD_REACH, 0.0, 0.0)))
-    encode(JointMapMessage.pack(_make_version(coordinator).build(JointOptimizer()), "s1"))
+    encode(JointMapMessage.pack(_make_version(coordinator).build(JointMapBuilder()), "s1"))
 
 
 def test_no_version_is_due_before_anything_was_received() -> None:

@@ -166,10 +166,12 @@ def test_a_map_that_did_not_come_is_asked_for(
     fields = {"robot": "a", "boot": robot_map.boot, "stamp": 0.0, "state": "finished"}
     status = StatusMessage.model_validate({**counts, **fields, "map_version": robot_map.version})
     with silent.declare_queryable(keys.AGENT_QUERY.build(**parts), answer):
-        for _ in range(6):
+        end, joint = time.monotonic() + network.patience, None
+        while joint is None and time.monotonic() < end:
             silent.put(keys.STATUS.build(**parts), encode(status))
-            time.sleep(0.5)
-        assert network.groups(watcher.next()) == [["a/0"]]
+            joint = watcher.within(0.5)
+        assert joint is not None
+        assert network.groups(joint) == [["a/0"]]
 
 
 def test_two_coordinators_of_a_team_say_so_both(start_server: StartServer, tmp_path: Path) -> None:
@@ -191,6 +193,10 @@ def test_a_coordinator_says_what_it_holds(network: Network, found: Found) -> Non
     map_a, map_b, alignments = found
     assert status.maps == (MapVersion.of(map_a), MapVersion.of(map_b))
     assert status.alignments == ((alignments.reference, alignments.other),)
+    assert {name: place.frame for name, place in status.frames.items()} == {
+        "a/0": "a/0",
+        "b/0": "a/0",
+    }
 
 
 def test_who_listened_before_a_coordinator_with_a_long_history_gets_the_latest_then_the_next(

@@ -9,7 +9,7 @@ import pytest
 
 from mapweave.geometry import se2
 from mapweave.reasons import ReasonKind, Status, StatusKind
-from mapweave.team.joint_optimization import JointOptimizer
+from mapweave.team.joint_builder import JointMapBuilder
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import last_version
 from mapweave_fusion_server.store import Store
@@ -75,7 +75,7 @@ class Team:
     def next_version(self) -> JointMap:
         """Return the version that is due, built."""
         assert self.coordinator.seconds_until_due(0.0) == 0.0
-        joint = self.coordinator.begin(0.0).build(JointOptimizer())
+        joint = self.coordinator.begin(0.0).build(JointMapBuilder())
         self.coordinator.finish(joint)
         return joint
 

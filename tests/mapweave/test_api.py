@@ -6,6 +6,7 @@ import inspect
 import pkgutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ import mapweave.lines
 import mapweave.scan
 import mapweave.shape
 from mapweave.errors import ArgumentError, FinishedError
+from mapweave.fusion.align import FusionParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.reasons import Reason, ReasonKind
@@ -165,6 +167,69 @@ def test_maps_of_one_robot_and_alignments_of_others_are_not_fused() -> None:
     foreign = mapweave.Alignment("x/0", "y/0", np.zeros(3), "refused", 0.0, unlike)
     with pytest.raises(ArgumentError, match=r"^alignments: .* got 'x/0'"):
         mapweave.fuse([empty], [foreign])
+
+
+def test_maps_and_alignments_that_can_be_gone_through_once_are_fused() -> None:
+    """A generator that was used up by the checks would be no maps, and nothing would say so."""
+    scans, _ = scans_along(BUILDING, [(2, 1), (4, 1)], 1)
+    maps = []
+    for robot in ("a", "b"):
+        mapper = mapweave.Mapper(robot)
+        for scan in scans:
+            mapper.add(scan)
+        maps.append(mapper.finish())
+    found = mapweave.align(maps[0], maps[1])
+    joint = mapweave.fuse((each for each in maps), (each for each in found))
+    assert [set(c.robots) for c in joint.components] == [
+        set(c.robots) for c in mapweave.fuse(maps, found).components
+    ]
+    assert {name for c in joint.components for name in c.robots} == {"a/0", "b/0"}
+    assert len(joint.alignments) == len(found)
+
+
+def test_maps_are_compared_as_the_configuration_says() -> None:
+    scans, _ = scans_along(BUILDING, [(2, 1), (4, 1)], 1)
+    mapper = mapweave.Mapper("a")
+    for scan in scans:
+        mapper.add(scan)
+    made = mapper.finish()
+    config = mapweave.Config(mapping=mapweave.Mapping(min_confidence=0.999, closeness=0.1))
+    by_hand = FusionParameters.of(config)
+    (found,), (same,) = (
+        mapweave.align(made, made, config=config),
+        mapweave.align(made, made, by_hand),
+    )
+    (otherwise,) = mapweave.align(made, made)
+    assert found.evidence == same.evidence != otherwise.evidence
+
+
+def test_arguments_of_another_kind_are_refused_by_name(tmp_path: Path) -> None:
+    empty, path = mapweave.RobotMap("a", "0", 0, ()), tmp_path / "drawn.svg"
+    joint = mapweave.fuse([empty])
+    wrong: list[tuple[str, Callable[..., object], list[object]]] = [
+        ("config: expected Config, got dict", mapweave.Mapper, ["a", "0", None, None, {}]),
+        ("scan: expected Scan, got list", mapweave.Mapper().add, [[1, 2]]),
+        ("scan: expected Scan, got list", mapweave.scan.extract_segments, [[1, 2]]),
+        ("other: expected RobotMap, got JointMap", mapweave.align, [empty, joint]),
+        ("config: expected Config, got dict", mapweave.align, [empty, empty, None, {}]),
+        (
+            "parameters: expected FusionParameters",
+            mapweave.align,
+            [empty, empty, mapweave.Config()],
+        ),
+        ("maps: expected a list of RobotMap, got RobotMap", mapweave.fuse, [empty]),
+        ("maps: expected RobotMap, got JointMap", mapweave.fuse, [[empty, joint]]),
+        ("alignments: expected Alignment, got int", mapweave.fuse, [[empty], [3]]),
+        ("config: expected Config, got dict", mapweave.fuse, [[empty], None, {}]),
+        ("some_map: expected RobotMap or JointMap, got list", mapweave.save, [[empty], path]),
+        ("some_map: expected RobotMap or JointMap, got str", mapweave.export, ["a.json", path]),
+        ("some_map: expected RobotMap or JointMap, got str", mapweave.plot, ["a.json", path]),
+        ("maps: expected Mapping, got list", mapweave.plot, [joint, path, [empty]]),
+    ]
+    for complaint, function, arguments in wrong:
+        with pytest.raises(ArgumentError, match=f"^{complaint}"):
+            function(*arguments)
+    assert not path.exists()
 
 
 @pytest.mark.parametrize(

@@ -216,3 +216,18 @@ def test_what_is_no_pair_of_degrees_is_refused_from_the_environment_too(value: s
     line = said(None, {"MAPWEAVE_SENSOR_MASKS": value})
     assert line.startswith("MAPWEAVE_SENSOR_MASKS: sensor.masks: expected pairs of directions")
     assert len(line) < 200
+
+
+def test_a_sensor_whose_every_reading_would_be_left_out_is_refused(file: Path) -> None:
+    file.write_text("[sensor]\nrange_min = 5\n")
+    line = said(file, {"MAPWEAVE_SENSOR_MAX_RANGE": "5"})
+    assert line == (
+        f"{file}: sensor.range_min: expected less than max_range, 5 m, found 5: no reading would"
+        " count"
+    )
+    assert Config.load(file, {"MAPWEAVE_SENSOR_MAX_RANGE": "5.1"}).sensor.range_min == 5
+
+
+def test_a_file_is_named_by_its_path_or_in_words(file: Path) -> None:
+    file.write_text("[mapping]\npatience = 9\n")
+    assert Config.load(str(file)) == Config.load(file)

@@ -34,6 +34,12 @@ def test_names_that_would_break_keys_or_files_are_refused(name: str) -> None:
         check_id("robot", name)
 
 
+@pytest.mark.parametrize("name", [None, 1, b"a", ["a"]])
+def test_what_is_no_text_is_no_name(name: str) -> None:
+    with pytest.raises(InvalidIdError):
+        check_id("robot", name)
+
+
 def test_the_message_is_one_line_that_names_the_kind_the_name_and_the_rule() -> None:
     with pytest.raises(InvalidIdError) as caught:
         check_id("team", "Bad\nName")

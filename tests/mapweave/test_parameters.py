@@ -20,7 +20,7 @@ from mapweave.mapping.tracking.tracker import TrackerParameters
 from mapweave.matching.icp import IcpParameters
 from mapweave.parameters import StageParameters
 from mapweave.scan.scan import Scan
-from mapweave.team.joint_map import JointParameters
+from mapweave.team.joining import JointParameters
 from mapweave.team.joint_optimization import JointOptimizationParameters
 from tests.mapweave.buildings import AROUND, BUILDING, cast, walls_of
 from tests.mapweave.test_config import bounds
@@ -44,11 +44,12 @@ MEASURED: dict[str, dict[str, object]] = {
     "ComponentMergingParameters": {"reach": 3.0, "max_reach": 7.5},
     "ContradictionParameters": {},
     "CorrelativeParameters": {"cell": 0.1, "reach": 1.2},
+    "CoverageParameters": {"reach": 0.35},
     "DecisionParameters": {"min_confidence": 0.85},
     "DistanceFieldParameters": {"cell": 0.1, "spacing": 0.2},
     "FftCorrelationParameters": {"clearance": 0.5},
     "FittingParameters": {"tolerance": 0.09, "max_hole": 0.3},
-    "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15, "cell": 0.05},
+    "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15, "cell": 0.05, "simplification": 0.1},
     "FusionParameters": {},
     "HypothesisParameters": {},
     "IcpParameters": {"end_scale": 0.04, "noise": 0.1},
@@ -77,6 +78,7 @@ MEASURED: dict[str, dict[str, object]] = {
         "spacing": 0.2,
         "sight": 25.0,
     },
+    "OwnBodyParameters": {"still": 0.06, "moved": 0.1, "edge": 0.25, "depth": 0.1},
     "PartParameters": {"length": 36.0},
     "PlaceRecognitionParameters": {},
     "PoseCovarianceParameters": {"noise": 0.1},
@@ -239,8 +241,17 @@ def configurations() -> st.SearchStrategy[Config]:
             values[name] = st.none() | numbers if unset else numbers
         return st.fixed_dictionaries(values)
 
+    def seeing(sensor: dict[str, Any]) -> dict[str, Any]:
+        """Return `sensor` so that readings can count."""
+        farthest = sensor["max_range"]
+        return (
+            sensor
+            if farthest is None
+            else {**sensor, "range_min": min(sensor["range_min"], farthest / 2)}
+        )
+
     return st.fixed_dictionaries(
-        {"sensor": of(Sensor), "robot": of(Robot), "mapping": of(Mapping)}
+        {"sensor": of(Sensor).map(seeing), "robot": of(Robot), "mapping": of(Mapping)}
     ).map(Config.model_validate)
 
 

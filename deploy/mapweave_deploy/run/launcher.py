@@ -15,6 +15,7 @@ from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.recorder import Recorder, is_done
 from mapweave_deploy.run.team_plan import Member
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.address import TOKEN_VARIABLE, HttpAddress
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.asking import ask_robot_map
 from mapweave_protocol.link.assembler import MapAssembler
@@ -69,6 +70,10 @@ class Plan:
         When to give up [s]; None never does.
     config
         The file that says what to change of the defaults, for agents and coordinator; or None.
+    page
+        Where the coordinator serves the live page, the port a given one; None where it does not.
+    token
+        What whoever gives orders by the page must know.
     """
 
     team: str
@@ -79,6 +84,8 @@ class Plan:
     states: Path
     timeout: float | None
     config: Path | None = None
+    page: HttpAddress | None = None
+    token: str = ""
 
     @property
     def robots(self) -> list[str]:
@@ -120,6 +127,16 @@ def free_endpoint() -> str:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def with_free_port(address: HttpAddress) -> HttpAddress:
+    """Return `address`, its port one that nobody listens at if it asks for any."""
+    if address.port:
+        return address
+    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+    with socket.socket(family) as probe:
+        probe.bind((address.host, 0))
+        return HttpAddress(address.host, probe.getsockname()[1])
 
 
 def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
@@ -189,9 +206,10 @@ def _is_coordinated(session: zenoh.Session, team: str) -> bool:
 
 def start_server(crew: ProcessGroup, plan: Plan, store: Path) -> None:
     """Start the coordinator on `store`."""
-    crew.start(
-        "server", SERVER, ["server", *plan.connection, *plan.computing, "--store", str(store)]
-    )
+    page = [] if plan.page is None else ["--http", plan.page.authority]
+    arguments = ["server", *plan.connection, *plan.computing, "--store", str(store), *page]
+    # Others on this machine see arguments; they do not see the environment.
+    crew.start("server", SERVER, arguments, {TOKEN_VARIABLE: plan.token} if page else {})
 
 
 def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mapweave.cli import add_config_argument, argument, positive
 from mapweave_deploy.sim.simulation import BUILDERS
+from mapweave_fusion_server.web.address import loopback_address
 from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import MAX_PORT
 
@@ -72,6 +73,13 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         help="where the router listens, such as tcp/127.0.0.1:7447 (default: a free port)",
     )
     parser.add_argument(
+        "--http",
+        type=argument(loopback_address),
+        metavar="HOST:PORT",
+        help="serve the live page there, on this machine only; port 0 takes a free one; at a"
+        " terminal it stays until Ctrl-C",
+    )
+    parser.add_argument(
         "--timeout",
         type=argument(positive),
         metavar="S",
@@ -102,17 +110,18 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
 
 
 def _natural(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise ValueError(f"{text}: expected 0 or more")
-    return value
+    return _whole(text, 0)
 
 
 def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise ValueError(f"{text}: expected 1 or more")
-    return value
+    return _whole(text, 1)
+
+
+def _whole(text: str, least: int) -> int:
+    """Return the number that `text` is; ValueError unless it is whole, and `least` or more."""
+    if not (text.isascii() and text.isdigit() and len(text) <= 9 and int(text) >= least):
+        raise ValueError(f"{text!r}: expected a whole number, {least} or more")
+    return int(text)
 
 
 def _rate(text: str) -> str:

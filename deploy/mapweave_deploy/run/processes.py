@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,7 +72,13 @@ class ProcessGroup:
         self.children: list[Child] = []
         self._logs = logs
 
-    def start(self, name: str, stage: int, arguments: Sequence[str]) -> Child:
+    def start(
+        self,
+        name: str,
+        stage: int,
+        arguments: Sequence[str],
+        environment: Mapping[str, str] | None = None,
+    ) -> Child:
         """Start ``mapweave`` with `arguments` as a process of its own.
 
         It gets a process group of its own too: a Ctrl-C at the terminal reaches the launcher only,
@@ -87,6 +93,7 @@ class ProcessGroup:
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 process_group=0,
+                env={**os.environ, **(environment or {})},
             )
         child = Child(name, stage, process, log)
         self.children.append(child)

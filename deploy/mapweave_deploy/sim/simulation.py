@@ -14,14 +14,26 @@ import numpy as np
 from mapweave.errors import MapweaveError
 from mapweave.geometry.arrays import FloatArray
 from mapweave_deploy.sim.arena import arena
-from mapweave_deploy.sim.lidar import LidarParameters, measure
+from mapweave_deploy.sim.lidar import LidarParameters
 from mapweave_deploy.sim.office import office
+from mapweave_deploy.sim.own_body import OwnBodyParameters
+from mapweave_deploy.sim.people import PeopleParameters
+from mapweave_deploy.sim.sweeps import SweepParameters, sweeps
 from mapweave_deploy.sim.trajectories import Tour, TourParameters, plan_tours
 from mapweave_deploy.sim.world import World
 
 TRUTH_FORMAT = "mapweave/truth/1"
-BUILDERS: dict[str, Callable[[int], World]] = {"office": office, "arena": arena}
-TOURS = {"office": TourParameters(), "arena": TourParameters(length=30.0)}
+BUILDERS: dict[str, Callable[[int], World]] = {
+    "office": office,
+    "arena": arena,
+    "crowd": office,
+    "body": office,
+}
+TOURS = {name: TourParameters() for name in BUILDERS} | {"arena": TourParameters(length=30.0)}
+SWEEPS = {name: SweepParameters() for name in BUILDERS} | {
+    "crowd": SweepParameters(people=PeopleParameters(along=3)),
+    "body": SweepParameters(body=OwnBodyParameters(width=np.radians(120.0))),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +64,8 @@ def simulate(
     Parameters
     ----------
     world
-        ``office`` or ``arena``.
+        ``office`` or ``arena``; ``crowd``: the office, and people who walk with each robot;
+        ``body``: the office, seen by robots that see themselves.
     robots
         How many, each with a tour of its own.
     seed
@@ -76,23 +89,24 @@ def simulate(
     tours = plan_tours(place, robots, TOURS[world], np.random.default_rng([seed, robots]))
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
-    return [
-        _write(place, f"r{number}", tour, seed, number, target)
-        for number, tour in enumerate(tours, start=1)
-    ]
+    logs = []
+    for number, tour in enumerate(tours, start=1):
+        robot = f"r{number}"
+        log = RobotLog(robot, target / f"{robot}.log", target / f"{robot}-truth.json", tour)
+        log.log.write_text(_measured(place, tour, SWEEPS[world], seed, number), encoding="ascii")
+        log.truth.write_text(_truth(place.name, seed, log), encoding="ascii")
+        logs.append(log)
+    return logs
 
 
-def _write(place: World, robot: str, tour: Tour, seed: int, number: int, folder: Path) -> RobotLog:
-    """Drive `tour`, measure, and write both files."""
-    lidar, rng = LidarParameters(), np.random.default_rng([seed, number, 1])
-    lines = [
-        scan_line(measure(place, pose, lidar, rng), float(stamp), lidar)
-        for stamp, pose in zip(tour.stamp, tour.pose, strict=True)
-    ]
-    log = RobotLog(robot, folder / f"{robot}.log", folder / f"{robot}-truth.json", tour)
-    log.log.write_text("".join(lines), encoding="ascii")
-    log.truth.write_text(_truth(place.name, seed, log), encoding="ascii")
-    return log
+def _measured(place: World, tour: Tour, around: SweepParameters, seed: int, number: int) -> str:
+    """Return the lines of the log of robot `number`."""
+    rng, others = (np.random.default_rng([seed, number, part]) for part in (1, 2))
+    measured = sweeps(place, tour, around, rng, others)
+    return "".join(
+        scan_line(ranges, float(stamp), around.lidar)
+        for ranges, stamp in zip(measured, tour.stamp, strict=True)
+    )
 
 
 def scan_line(ranges: FloatArray, stamp: float, lidar: LidarParameters) -> str:

@@ -18,10 +18,13 @@ class ReadOptions:
     topic
         Of a bag: the laser's topic, such as ``/scan``; None takes the only one there is.
     on_warning
-        Called once, after the last scan, if something was left out.
+        Called once, after the last scan, if something was left out; of a live source, when it is.
+    network
+        Endpoints of the network that the reader is on, for sources that are on it as well.
     """
 
     odometry: bool = False
     angular_step: float | None = None
     topic: str | None = None
     on_warning: Callable[[str], None] = warnings.warn
+    network: tuple[str, ...] | None = None

@@ -102,16 +102,16 @@ def _format(path: Path) -> ScanReader:
     """Return the format of the file at `path`; that of logs where nothing else fits."""
     if not stat.S_ISREG(path.stat().st_mode):
         return log  # A pipe can be read only once.
-    with path.open("rb") as file:
-        head = file.read(64)
-        for binary in BINARY_FORMATS:
-            if binary.sniffs(head):
-                return binary
-        file.seek(0)
-        try:
+    try:
+        with path.open("rb") as file:
+            head = file.read(64)
+            for binary in BINARY_FORMATS:
+                if binary.sniffs(head):
+                    return binary
+            file.seek(0)
             unpacked = next(read_blocks(file), b"")
-        except (DamagedStreamError, UnusableArchiveError):
-            return log  # says it of a whole file
+    except (OSError, DamagedStreamError, UnusableArchiveError):
+        return log  # says it of a whole file
     for binary in BINARY_FORMATS:
         if binary.sniffs(unpacked):
             raise FileError(path, "is a packed bag; expected it unpacked")

@@ -1,4 +1,4 @@
-"""The best transforms of which no two are alike."""
+"""The best transforms of which no two are alike, and which transforms agree."""
 
 from typing import cast
 
@@ -50,3 +50,50 @@ def distinct(
     """
     compute = distinct_numpy if COMPILED is None else COMPILED.distinct
     return cast("IntArray", compute(place, turn, scores, count, distance, angle))
+
+
+def agreeing_numpy(
+    place: FloatArray, turn: FloatArray, count: int, distance: float, angle: float
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Twin of `agreeing`."""
+    left = np.ones(len(turn), dtype=np.bool_)
+    bests, start, members = list[int](), [0], [np.empty(0, dtype=np.int64)]
+    while left.any() and len(bests) < count:
+        best = int(left.argmax())
+        bests.append(best)
+        apart = np.hypot(*(place - place[best]).T)
+        turned = np.pi - np.mod(np.pi - (turn - turn[best]), 2 * np.pi)
+        members.append(np.flatnonzero((apart <= distance) & (np.abs(turned) <= angle)))
+        left[members[-1]] = left[best] = False
+        start.append(start[-1] + len(members[-1]))
+    numbers = np.array(bests, dtype=np.int64), np.array(start, dtype=np.int64)
+    return (*numbers, np.concatenate(members))
+
+
+def agreeing(
+    place: FloatArray, turn: FloatArray, count: int, distance: float, angle: float
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return at most `count` groups of transforms, each of all that agree with its best.
+
+    That is the first that is in no group before; others may be in several.
+
+    Parameters
+    ----------
+    place
+        (n, 2) where each puts the middle of the map that is moved [m].
+    turn
+        (n,) [rad].
+    distance, angle
+        [m], [rad] within both of which two agree.
+
+    Returns
+    -------
+    best
+        (g,) number of each group's.
+    start
+        (g + 1,) where each group begins among the members, and how many there are.
+    members
+        (m,) numbers, group by group, ascending in each.
+    """
+    compute = agreeing_numpy if COMPILED is None else COMPILED.agreeing
+    return cast("tuple[IntArray, IntArray, IntArray]", compute(place, turn, count, distance, angle))

@@ -1,7 +1,7 @@
-"""Which windows of two maps are alike, and the motions that lay one on the other."""
+"""Windows of maps, which of two maps' are alike, and the motions that lay one on the other."""
 
 import itertools
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -29,6 +29,44 @@ class AlikePairs(NamedTuple):
     similarity: FloatArray
     transform: FloatArray
     residual: FloatArray
+
+
+def sample_windows_numpy(
+    segments: FloatArray, begin: FloatArray, length: float, samples: int
+) -> tuple[ComplexArray, FloatArray]:
+    """Twin of `sample_windows`."""
+    steps = segments[:, 2:] - segments[:, :2]
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    ends = np.cumsum(lengths)
+    at = begin[:, None] + length * (np.arange(samples) + 0.5) / samples
+    segment = np.minimum(np.searchsorted(ends, at, side="right"), len(ends) - 1)
+    unit = steps / np.where(lengths > 0, lengths, 1)[:, None]
+    along = at - (ends - lengths)[segment]
+    points = segments[segment, :2] + along[..., None] * unit[segment]
+    return (unit[:, 0] + 1j * unit[:, 1])[segment], points
+
+
+def sample_windows(
+    segments: FloatArray, begin: FloatArray, length: float, samples: int
+) -> tuple[ComplexArray, FloatArray]:
+    """Return exp(i · direction) (k, m) and place (k, m, 2) [m] of the samples of windows.
+
+    Each stands for the middle of an equal share of its window.
+
+    Parameters
+    ----------
+    segments
+        (n, 4) x1 y1 x2 y2 [m], in order; none has no windows.
+    begin
+        (k,) where windows begin: the arc length from the first segment's start on [m].
+    length
+        Of a window [m].
+    samples
+        How many a window has.
+    """
+    compute = sample_windows_numpy if COMPILED is None else COMPILED.sample_windows
+    found = compute(np.ascontiguousarray(segments), begin, length, samples)
+    return cast("tuple[ComplexArray, FloatArray]", found)
 
 
 def alike_windows_numpy(

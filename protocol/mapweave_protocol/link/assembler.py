@@ -51,6 +51,14 @@ class MapSender:
         self._messages_since = 0 if whole else (self._messages_since or 0) + 1
         return payload
 
+    def as_sent(self, robot_map: RobotMap) -> RobotMap:
+        """Return `robot_map` as it arrives, so that both ends decide alike."""
+        submaps = (
+            replace(self._pack(s).restored, component=s.component, pose=Place.of(s).pose)
+            for s in robot_map.submaps
+        )
+        return replace(robot_map, submaps=tuple(submaps))
+
     def _pack(self, submap: Submap) -> PackedSubmap:
         """Return `submap` packed; a finished one keeps its map, so it is packed once."""
         before = self._packed.get(submap.id)

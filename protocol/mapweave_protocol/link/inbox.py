@@ -19,6 +19,7 @@ from mapweave_protocol.wire.keys import (
     JOINT_STATUS,
     LIVE,
     MAP,
+    POSE,
     STATUS,
     KeyFormat,
 )
@@ -27,6 +28,7 @@ from mapweave_protocol.wire.messages import (
     JointMapMessage,
     JointStatusMessage,
     MapMessage,
+    PoseMessage,
     StatusMessage,
 )
 from mapweave_protocol.wire.model import Message
@@ -77,6 +79,19 @@ class Inbox:
         with self._changed:
             self._changed.wait_for(lambda: self._arrivals, timeout)
             return self._arrivals.popleft() if self._arrivals else None
+
+    def newest(self, timeout: float) -> Arrival | None:
+        """As `get`, of several arrivals at the key that is next the last one only."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._arrivals, timeout)
+            if not self._arrivals:
+                return None
+            key = self._arrivals[0].key
+            same = [arrival for arrival in self._arrivals if arrival.key == key]
+            others = [arrival for arrival in self._arrivals if arrival.key != key]
+            self._arrivals.clear()
+            self._arrivals.extend(others)
+            return same[-1]
 
 
 class Reader(Generic[M]):
@@ -175,6 +190,11 @@ def check_origin(message: Message, parts: Mapping[str, str]) -> None:
 def map_reader() -> Reader[MapMessage]:
     """Return a reader of robot maps."""
     return Reader(MapMessage, MAP)
+
+
+def pose_reader() -> Reader[PoseMessage]:
+    """Return a reader of poses."""
+    return Reader(PoseMessage, POSE)
 
 
 def status_reader() -> Reader[StatusMessage]:

@@ -90,7 +90,7 @@ def _common_settings() -> dict[str, object]:
 
 def _config(settings: Mapping[str, object], endpoints: Sequence[str]) -> zenoh.Config:
     config = zenoh.Config()
-    if not all(_is_endpoint(endpoint) for endpoint in endpoints):
+    if not endpoints or not all(_is_endpoint(endpoint) for endpoint in endpoints):
         raise EndpointError(tuple(endpoints))
     try:
         for path, value in settings.items():
@@ -101,7 +101,7 @@ def _config(settings: Mapping[str, object], endpoints: Sequence[str]) -> zenoh.C
 
 
 def _is_endpoint(text: str) -> bool:
-    match = _ENDPOINT.fullmatch(text)
+    match = _ENDPOINT.fullmatch(text) if isinstance(text, str) else None
     return match is not None and int(match[2]) <= MAX_PORT
 
 
@@ -118,7 +118,8 @@ def open_session(
     Parameters
     ----------
     endpoints
-        Of the router, `default_endpoints` unless told; with several, the first that answers.
+        Of the router, `default_endpoints` unless told; with several, the first that answers. One
+        may be given as it is.
     patience
         How long to try [s]; None for as long as it takes.
     on_wait
@@ -127,10 +128,12 @@ def open_session(
     Raises
     ------
     EndpointError
-        If an endpoint is not one.
+        If an endpoint is not one, or there is none.
     UnreachableError
         If nobody answered for `patience`.
     """
+    if isinstance(endpoints, str):  # a sequence, too: of letters
+        endpoints = [endpoints]
     addresses = default_endpoints() if endpoints is None else tuple(endpoints)
     with _connect(addresses, mode, patience, on_wait) as session:
         yield session
@@ -175,6 +178,16 @@ def declare_joint_publisher(session: zenoh.Session, key: str) -> ze.AdvancedPubl
 def declare_status_publisher(session: zenoh.Session, key: str) -> zenoh.Publisher:
     """Return a publisher of statuses: the next one says all that a lost one said."""
     return session.declare_publisher(key, congestion_control=zenoh.CongestionControl.DROP)
+
+
+def declare_pose_publisher(session: zenoh.Session, key: str) -> zenoh.Publisher:
+    """Return a publisher of poses: sent at once, and before maps."""
+    return session.declare_publisher(
+        key,
+        congestion_control=zenoh.CongestionControl.DROP,
+        priority=zenoh.Priority.INTERACTIVE_HIGH,
+        express=True,
+    )
 
 
 def _declare_publisher(session: zenoh.Session, key: str, cached: int) -> ze.AdvancedPublisher:

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import zenoh
 
+from mapweave.geometry.arguments import as_positive
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.asking import ask_joint_maps, ask_latest
@@ -24,16 +25,23 @@ from mapweave_protocol.link.inbox import (
     joint_reader,
     joint_status_reader,
     map_reader,
+    pose_reader,
     status_reader,
 )
 from mapweave_protocol.link.sequence import SHORT_HISTORY, JointSequence
 from mapweave_protocol.link.session import declare_subscriber, open_session
-from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, JOINT_STATUS, MAP, STATUS
-from mapweave_protocol.wire.messages import AlignmentMessage, JointMapMessage, StatusMessage
+from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, JOINT_STATUS, MAP, POSE, STATUS
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    JointMapMessage,
+    PoseMessage,
+    StatusMessage,
+)
 from mapweave_protocol.wire.model import MAX_COUNT, Message
 from mapweave_protocol.wire.queries import JointQuery
 
 POLL = 0.5  # [s] after which a gap is asked about again
+MAX_POSES = 256  # of one each robot
 
 M = TypeVar("M", bound=Message)
 _log = logging.getLogger(__name__)
@@ -56,9 +64,9 @@ def joint_maps(
     team
         The team's id.
     connect
-        Endpoints of the router; by default ``MAPWEAVE_CONNECT`` or this machine.
+        Endpoints of the router, or one; by default ``MAPWEAVE_CONNECT`` or this machine.
     timeout
-        End after this time without a new one [s]; None never ends.
+        End after this time without a new one [s], above 0; None never ends.
     stopping
         Asked now and then: where it says so, end.
 
@@ -68,6 +76,8 @@ def joint_maps(
         If `team` is not an id.
     EndpointError
         If an endpoint is not one.
+    ArgumentError
+        If `timeout` is not above 0.
     UnreachableError
         If no router answers within `timeout`.
     """
@@ -84,7 +94,7 @@ def joint_maps(
         def expect() -> None:
             _expect(sequence, said)
 
-        messages = takewhile(lambda _: not stopping(), _read(joint_reader(), inbox, timeout))
+        messages = takewhile(lambda _: not stopping(), _read(joint_reader(), inbox.get, timeout))
         yield from _in_order(sequence, messages, expect, ask)
 
 
@@ -95,7 +105,7 @@ def robot_maps(
     assembler = MapAssembler()
     key = MAP.pattern(team=team)
     with _listening(key, connect, timeout, MESSAGES_TO_COMPLETE) as (_, inbox):
-        for message in _read(map_reader(), inbox, timeout):
+        for message in _read(map_reader(), inbox.get, timeout):
             robot_map = assembler.update(message) if message else None
             if robot_map is not None:
                 yield robot_map
@@ -106,7 +116,7 @@ def alignments(
 ) -> Iterator[AlignmentMessage]:
     """Yield what the robots find out about pairs of maps; as for `joint_maps`."""
     with _listening(ALIGNMENT.pattern(team=team), connect, timeout, 1) as (_, inbox):
-        yield from filter(None, _read(alignment_reader(), inbox, timeout))
+        yield from filter(None, _read(alignment_reader(), inbox.get, timeout))
 
 
 def statuses(
@@ -114,7 +124,27 @@ def statuses(
 ) -> Iterator[StatusMessage]:
     """Yield the robots' statuses; as for `joint_maps`."""
     with _listening(STATUS.pattern(team=team), connect, timeout, 1) as (_, inbox):
-        yield from filter(None, _read(status_reader(), inbox, timeout))
+        yield from filter(None, _read(status_reader(), inbox.get, timeout))
+
+
+def poses(
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    stopping: Callable[[], bool] = lambda: False,
+) -> Iterator[PoseMessage]:
+    """Yield where the robots are, at the rate of their scans; as for `joint_maps`.
+
+    Who takes them more slowly gets the newest of each robot.
+    """
+    inbox, key = Inbox(MAX_POSES), POSE.pattern(team=team)
+    with (
+        open_session(connect, patience=timeout) as session,
+        session.declare_subscriber(key, inbox.put),
+    ):
+        read = _read(pose_reader(), inbox.newest, timeout)
+        yield from filter(None, takewhile(lambda _: not stopping(), read))
 
 
 @contextmanager
@@ -122,6 +152,8 @@ def _listening(
     key: str, connect: Sequence[str] | None, timeout: float | None, history: int
 ) -> Iterator[tuple[zenoh.Session, Inbox]]:
     """Open a session and an inbox for what is published at `key`."""
+    if timeout is not None:
+        as_positive("timeout", timeout, "s")
     inbox = Inbox()
     with (
         open_session(connect, patience=timeout) as session,
@@ -130,11 +162,13 @@ def _listening(
         yield session, inbox
 
 
-def _read(reader: Reader[M], inbox: Inbox, timeout: float | None) -> Iterator[M | None]:
+def _read(
+    reader: Reader[M], get: Callable[[float], Arrival | None], timeout: float | None
+) -> Iterator[M | None]:
     """Yield each valid message, and None now and then while there is none, until `timeout` [s]."""
     heard = time.monotonic()
     while timeout is None or time.monotonic() - heard < timeout:
-        arrival: Arrival | None = inbox.get(POLL if timeout is None else min(POLL, timeout))
+        arrival = get(POLL if timeout is None else min(POLL, timeout))
         message = reader.read(arrival) if arrival else None
         if message is not None:
             heard = time.monotonic()

@@ -33,6 +33,7 @@ from mapweave_protocol.link.inbox import (
 )
 from mapweave_protocol.link.session import declare_subscriber, open_session
 from mapweave_protocol.narration.story import Story
+from mapweave_protocol.narration.story_coverage import CoverageStory
 from mapweave_protocol.narration.story_joint import tell_components
 from mapweave_protocol.wire.keys import (
     ALIGNMENT,
@@ -60,6 +61,7 @@ class Watcher:
 
     def __init__(self) -> None:
         self.story = Story()
+        self._coverage = CoverageStory()
         self._assembler = MapAssembler()
         self._told: tuple[str, int] | None = None
         self._tellers: tuple[Teller, ...] = (
@@ -79,7 +81,9 @@ class Watcher:
         """Yield the lines that tell a version of the joint map, once."""
         if self._told != (message.series, message.version):
             self._told = message.series, message.version
-            yield from self.story.joined(message.unpack())
+            joint = message.unpack()
+            yield from self.story.joined(joint)
+            yield from self._coverage.changed(joint)
 
     def _tell_map(self, message: MapMessage) -> Iterator[str]:
         robot_map = self._assembler.update(message)

@@ -4,9 +4,35 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from mapweave.maps import JointMap, parse_component
 from mapweave_protocol.wire.alignment_message import MapVersion
-from mapweave_protocol.wire.model import MAX_ALIGNMENTS, Count, Id, Message, Number
+from mapweave_protocol.wire.model import (
+    MAX_ALIGNMENTS,
+    ComponentName,
+    Count,
+    Id,
+    JointTransform,
+    Message,
+    Number,
+    WireModel,
+    to_transform,
+)
 from mapweave_protocol.wire.status_message import MAX_PEERS
+
+
+class Place(WireModel):
+    """Where a robot's component is in the joint map.
+
+    Attributes
+    ----------
+    frame
+        The component whose frame the joint frame is: the first in it, by name.
+    pose
+        [m, m, rad] joint frame.
+    """
+
+    frame: ComponentName
+    pose: JointTransform
 
 
 class JointStatusMessage(Message):
@@ -26,6 +52,8 @@ class JointStatusMessage(Message):
         Which state of each robot's map is held.
     alignments
         For each pair of robots whose alignments are held, of which states of the maps.
+    frames
+        Where each component of the latest version is: enough to say where a robot is in it.
     """
 
     kind: ClassVar[bytes] = b"c"
@@ -40,3 +68,14 @@ class JointStatusMessage(Message):
     alignments: tuple[tuple[MapVersion, MapVersion], ...] = Field(
         default=(), max_length=MAX_ALIGNMENTS
     )
+    frames: dict[ComponentName, Place] = Field(default_factory=dict, max_length=MAX_ALIGNMENTS)
+
+
+def frames_of(joint: JointMap | None) -> dict[str, Place]:
+    """Return the frames of `joint`, none where there is no joint map."""
+    components = () if joint is None else joint.components
+    return {
+        name: Place(frame=min(one.robots, key=parse_component), pose=to_transform(pose))
+        for one in components
+        for name, pose in one.robots.items()
+    }

@@ -74,6 +74,7 @@ class KeyFormat:
 
 
 MAP = KeyFormat("mapweave/v2/{team}/agent/{robot}/map")
+POSE = KeyFormat("mapweave/v2/{team}/agent/{robot}/pose")
 STATUS = KeyFormat("mapweave/v2/{team}/agent/{robot}/status")
 ALIGNMENT = KeyFormat("mapweave/v2/{team}/agent/{robot}/alignment/{reference}/{other}")
 JOINT_MAP = KeyFormat("mapweave/v2/{team}/joint/map")

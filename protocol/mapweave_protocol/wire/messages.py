@@ -8,6 +8,7 @@ from mapweave_protocol.wire.alignment_message import AlignmentMessage, MapVersio
 from mapweave_protocol.wire.joint_message import JointMapMessage
 from mapweave_protocol.wire.joint_status_message import JointStatusMessage
 from mapweave_protocol.wire.map_message import MapMessage
+from mapweave_protocol.wire.pose_message import PoseMessage
 from mapweave_protocol.wire.status_message import Compared, StatusMessage, Traffic
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "JointStatusMessage",
     "MapMessage",
     "MapVersion",
+    "PoseMessage",
     "StatusMessage",
     "Traffic",
 ]

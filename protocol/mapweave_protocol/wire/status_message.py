@@ -34,12 +34,16 @@ class StatusMessage(Message):
         When it was said [s since 1970].
     scans_total
         How many scans there are to come in all, where known.
+    scans_skipped
+        How many came faster than they could be mapped; none of a recording.
+    scan_age
+        How long one waited at most since the last status [s]; None of a recording.
     compared
         By peer, for the pairs this robot compared.
     holds
         Which state of each peer's map is held.
     sent
-        By kind of message: ``map``, ``alignment``, ``status``.
+        By kind of message: ``map``, ``alignment``, ``pose``, ``status``.
     """
 
     kind: ClassVar[bytes] = b"s"
@@ -52,6 +56,8 @@ class StatusMessage(Message):
     scans_seen: Count
     scans_placed: Count
     scans_total: Count | None = None
+    scans_skipped: Count = 0
+    scan_age: Number | None = None
     components: Count
     submaps: Count
     map_version: Count

@@ -1,14 +1,15 @@
 """How the launcher starts the processes of a team."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mapweave_deploy.run.launcher import Plan, start_agent, start_server
+from mapweave_deploy.run.launcher import Plan, start_agent, start_server, with_free_port
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.team_plan import Member
+from mapweave_fusion_server.web.address import TOKEN_VARIABLE, HttpAddress
 
 
 class Noted(ProcessGroup):
@@ -17,10 +18,18 @@ class Noted(ProcessGroup):
     def __init__(self, logs: Path) -> None:
         super().__init__(logs)
         self.words: list[list[str]] = []
+        self.told: list[dict[str, str]] = []
 
-    def start(self, name: str, stage: int, arguments: Sequence[str]) -> None:  # type: ignore[override]  # nothing is started
-        """Note the words."""
+    def start(  # type: ignore[override]  # nothing is started
+        self,
+        name: str,
+        stage: int,
+        arguments: Sequence[str],
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """Note the words, and what only the process itself is told."""
         self.words.append([name, str(stage), *arguments])
+        self.told.append(dict(environment or {}))
 
 
 @pytest.mark.parametrize("config", [None, Path("robot.toml")])
@@ -39,3 +48,26 @@ def test_agents_and_coordinator_get_the_configuration_of_the_team(
     for words in (server, agent):
         given = words[words.index("--config") + 1] if "--config" in words else None
         assert given == (None if config is None else "robot.toml")
+
+
+def test_the_coordinator_alone_serves_the_page_and_nobody_else_sees_the_token(
+    tmp_path: Path,
+) -> None:
+    page = HttpAddress("127.0.0.1", 8080)
+    plan = Plan(
+        *("t", [], "max", "tcp/127.0.0.1:1", tmp_path / "store", tmp_path, None),
+        page=page,
+        token="secret",
+    )
+    crew = Noted(tmp_path)
+    start_server(crew, plan, plan.store)
+    (words,), (told,) = crew.words, crew.told
+    assert words[words.index("--http") + 1] == "127.0.0.1:8080"
+    assert told == {TOKEN_VARIABLE: "secret"}
+    assert "secret" not in " ".join(words)
+
+
+def test_a_port_is_chosen_once_so_that_the_page_comes_back_where_it_was() -> None:
+    chosen = with_free_port(HttpAddress("127.0.0.1", 0))
+    assert chosen.port > 0
+    assert with_free_port(chosen) == chosen

@@ -108,6 +108,8 @@ def test_a_killed_launcher_takes_all_processes_with_it(tmp_path: Path) -> None:
 
 
 def test_a_team_out_of_time_says_who_is_not_done(tmp_path: Path) -> None:
+    for end in ("", "-journal", "-wal", "-shm"):  # as an earlier one that was killed left them
+        (tmp_path / f"store-new.sqlite{end}").touch()
     command = [*PROGRAM, "team", "--world", "arena", "--robots", "2", "--rate", "1"]
     told = subprocess.run(
         [*command, "--timeout", "1", "--output", str(tmp_path)],
@@ -128,7 +130,16 @@ def test_a_team_out_of_time_says_who_is_not_done(tmp_path: Path) -> None:
         (["--world", "office", "some.log"], 2, r"(?s).*expected either logs or --world\n"),
         ([], 2, r"(?s).*expected either logs or --world\n"),
         (["--world", "moon"], 2, r"(?s).*invalid choice: 'moon'.*\n"),
-        (["--world", "arena", "--robots", "0"], 2, r"(?s).*expected 1 or more\n"),
+        (
+            ["--world", "arena", "--robots", "0"],
+            2,
+            r"(?s).*'0': expected a whole number, 1 or more\n",
+        ),
+        (
+            ["--world", "arena", "--seed", "x"],
+            2,
+            r"(?s).*'x': expected a whole number, 0 or more\n",
+        ),
         (["--world", "arena", "--team", "A/B"], 1, r"mapweave: team 'A/B': expected .*\n"),
         (["--world", "arena", "--rate", "fast"], 2, r"(?s).*--rate.*'fast'.*\n"),
     ],

@@ -135,7 +135,7 @@ def test_maps_are_fused_with_the_configuration_and_the_joint_map_says_so(
 def test_the_configuration_decides_how_sure_an_alignment_must_be() -> None:
     maps = [robot_map("a", part(BUILDING, 0, 16)), robot_map("b", part(BUILDING, 12, 30))]
     joined, apart = (
-        fuse(maps, config=Config(mapping=Mapping(min_confidence=least))) for least in (0.9, 0.95)
+        fuse(maps, config=Config(mapping=Mapping(min_confidence=least))) for least in (0.9, 0.999)
     )
     assert (len(joined.components), len(apart.components)) == (1, 2)
 

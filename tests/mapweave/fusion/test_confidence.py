@@ -22,7 +22,7 @@ def test_it_is_a_probability_even_for_nonsense() -> None:
 
 def test_without_a_rival_it_is_the_logistic_function_of_the_features() -> None:
     best = verdict(30, 2)
-    odds = P.intercept + features(best) @ [P.score, P.held]
+    odds = P.intercept + features(best, None) @ [P.score, P.held, P.overlap, P.lead]
     assert confidence(best, None, P) == pytest.approx(1 / (1 + np.exp(-odds)), rel=1e-12)
 
 
@@ -47,7 +47,7 @@ def test_a_strong_rival_lowers_it_and_a_hopeless_one_counts_as_none() -> None:
 
 
 def test_a_hypothesis_more_contradicted_than_matched_is_improbable_however_it_is_held() -> None:
-    assert features(verdict(3, 9))[0] == 0
+    assert features(verdict(3, 9), None)[0] == 0
     assert confidence(verdict(300, 900, held=100.0), None, P) < 0.5
 
 

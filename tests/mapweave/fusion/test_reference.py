@@ -5,6 +5,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
+from mapweave.errors import ArgumentError
 from mapweave.fusion.reference import (
     ReferenceParameters,
     close_parts,
@@ -209,3 +210,13 @@ def test_the_corner_that_proposed_an_alignment_confirms_it_whatever_else_is_ther
 def test_a_map_of_nothing_gives_no_proposals(first: int, second: int) -> None:
     maps = [LineMap.empty(), line_map(RIGHT_ANGLE)]
     assert list(proposals(maps[first], maps[second])) == []
+
+
+def test_the_pieces_take_lists_and_vertices_and_refuse_by_name_what_is_neither() -> None:
+    corner = [[0, 0], [2, 0], [2, 2]]
+    np.testing.assert_array_equal(hausdorff(corner, corner), hausdorff(RIGHT_ANGLE, RIGHT_ANGLE))
+    np.testing.assert_allclose(congruent_alignment(corner, RIGHT_ANGLE), 0, atol=1e-12)
+    with pytest.raises(ArgumentError, match=r"^second: expected finite"):
+        close_parts(corner, [[0, 0, 1, np.nan]], 0.3)
+    with pytest.raises(ArgumentError, match=r"^part: expected \(n, 4\) segments"):
+        congruent_alignment([[0, 0, 0]], corner)

@@ -240,9 +240,12 @@ def test_a_map_file_has_the_published_fields(tmp_path: Path) -> None:
 
 def test_a_joint_map_file_has_the_published_fields_and_the_free_space(tmp_path: Path) -> None:
     write_joint(tmp_path / "joint.json", read_joint(write(tmp_path, TYPED)))
-    assert json.loads((tmp_path / "joint.json").read_text()) == changed(
-        TYPED, ["components", 0, "free_space"], []
-    )
+    written = json.loads((tmp_path / "joint.json").read_text())
+    searched = {"explored_m2": 0.0, "frontiers": []}
+    assert searched.items() <= written["components"][0].items()
+    for field in searched:
+        del written["components"][0][field]
+    assert written == changed(TYPED, ["components", 0, "free_space"], [])
 
 
 def test_a_file_from_before_causes_were_typed_keeps_its_sentence(tmp_path: Path) -> None:
@@ -456,3 +459,12 @@ def test_a_missing_file_and_a_folder_are_refused(
 ) -> None:
     assert refusal(read, tmp_path / "missing.json").startswith("cannot be read (No such file")
     assert refusal(read, tmp_path).startswith("cannot be read (Is a directory)")
+
+
+def test_a_joint_map_file_says_what_was_searched_and_where_it_goes_on(tmp_path: Path) -> None:
+    ring = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]]
+    searched = changed(TYPED, ["components", 0, "free_space"], [ring])
+    write_joint(tmp_path / "joint.json", read_joint(write(tmp_path, searched)))
+    component = json.loads((tmp_path / "joint.json").read_text())["components"][0]
+    assert component["explored_m2"] == 6.0
+    assert [3.0, 2.0] in [point for line in component["frontiers"] for point in line]

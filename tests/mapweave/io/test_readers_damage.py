@@ -218,6 +218,12 @@ def test_a_file_that_may_not_be_read_is_refused(tmp_path: Path) -> None:
         read(path)
 
 
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="no file that cannot be read")
+def test_a_file_that_breaks_off_under_the_reader_is_refused() -> None:
+    with pytest.raises(FileError, match=r"cannot be read \(Input/output error\)"):
+        read(Path("/proc/self/mem"))
+
+
 def test_a_log_can_be_piped_in(tmp_path: Path) -> None:
     code = (
         "from mapweave.io.readers import read_scans\n"

@@ -9,6 +9,7 @@ from mapweave.kernels.arrays import FloatArray
 from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.matching import (
     corners,
+    density,
     distinct,
     judging,
     marks,
@@ -60,6 +61,14 @@ def test_the_nearest_samples_are_as_far(seed: int, count: int, shape: tuple[int,
     for owner in (nearest, twin):
         away = np.hypot(*np.moveaxis(cells[owner] - here, -1, 0)) * CELL
         np.testing.assert_allclose(away, distance, rtol=1e-6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, st.sampled_from([0.05, 0.5, 3.0]))
+def test_wall_is_drawn_as_often(seed: int, count: int, radius: float) -> None:
+    rng = np.random.default_rng(seed)
+    asked = some_places(rng, count), units(rng, count), rng.uniform(0, 1, count), radius, 0.8
+    same(density.times_drawn(*asked), density.times_drawn_numpy(*asked))
 
 
 @settings(max_examples=40, deadline=None)
@@ -124,6 +133,29 @@ def test_the_same_windows_are_alike(seed: int, one: int, two: int) -> None:
     product = size * np.exp(1j * rng.uniform(-np.pi, np.pi, (one, two)))
     asked = product, rows, columns, 0.7, -0.1
     same(tuple(windows.alike_windows(*asked)), tuple(windows.alike_windows_numpy(*asked)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.integers(1, 12), counts)
+def test_windows_are_sampled_alike(seed: int, walls: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    segments = rng.uniform(-3, 3, (walls, 4))
+    segments[0, 2:] = segments[0, :2]  # of no length
+    begin = np.sort(rng.uniform(0, 3, count))  # the last ones beyond the end
+    asked = segments, begin, 1.5, 7
+    codes, points = windows.sample_windows(*asked)
+    twin_codes, twin_points = windows.sample_windows_numpy(*asked)
+    np.testing.assert_allclose(codes, twin_codes, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(points, twin_points, rtol=0, atol=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, st.sampled_from([0, 1, 5, 50]))
+def test_the_same_transforms_agree(seed: int, count: int, most: int) -> None:
+    rng = np.random.default_rng(seed)
+    asked = some_places(rng, count), rng.uniform(-4, 4, count), most, 1.0, 0.6
+    for one, other in zip(distinct.agreeing(*asked), distinct.agreeing_numpy(*asked), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @settings(max_examples=40, deadline=None)

@@ -62,10 +62,12 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
     np.testing.assert_array_equal(
         compiled.explains(*asked, poses, 0.5), twin.explains(*asked, poses, 0.5)
     )
-    clear, every = rng.uniform(0, 9, 50), int(rng.integers(1, 4))
+    beams, every = int(rng.choice([1, 50, 360])), int(rng.integers(1, 4))
+    clear = rng.uniform(0, 9) + rng.uniform(0, rng.choice([0.1, 3.0]), beams)
+    spacing = 2 * np.pi / 360 if beams == 360 else 0.06
 
     def shares(points: PointMap) -> FloatArray:
-        return points.seen_through(clear, -1.5, 0.06, poses, 0.3, 3.0, 6.0, 0.7, every)
+        return points.seen_through(clear, -1.5, spacing, poses, 0.3, 3.0, 6.0, 0.7, every)
 
     np.testing.assert_allclose(shares(compiled), shares(twin))
 
@@ -107,14 +109,15 @@ def test_viewpoints_saw_through_the_same(seed: int, count: int, spacing: float) 
 
 
 @settings(max_examples=25, deadline=None)
-@given(seeds, st.integers(0, 60))
-def test_windows_score_the_same(seed: int, count: int) -> None:
+@given(seeds, st.integers(0, 60), st.booleans())
+def test_windows_score_the_same(seed: int, count: int, regular: bool) -> None:
     rng = np.random.default_rng(seed)
     points, origin = rng.uniform(-4, 4, (count, 2)), np.array([-3.0, -3.0])
     field = correlative.nearness_field(points, origin, 0.1, 60, 0.15)
     twin = correlative.nearness_field_numpy(points, origin, 0.1, 60, 0.15)
     np.testing.assert_allclose(field, twin, atol=1e-6)
-    window = rng.uniform(-3, 3, 5), rng.uniform(-1, 1, (4, 2))
+    shifts = np.arange(-0.9, 1, 0.3)[:, None] + rng.uniform(-1, 1, 2)
+    window = rng.uniform(-3, 3, 40), shifts if regular else rng.uniform(-1, 1, (4, 2))
     one = correlative.window_scores(points, twin, origin, 0.1, *window)
     other = correlative.window_scores_numpy(points, twin, origin, 0.1, *window)
     np.testing.assert_allclose(one, other, atol=1e-4)

@@ -76,6 +76,15 @@ def test_the_first_scan_that_was_taken_elsewhere_departs(at: int, rng: Generator
     assert abs(first_departed([*here, *there], poses, frame) - at) <= 1
 
 
+def test_a_departure_into_a_look_alike_begins_with_the_first_scans_that_are_refuted_at_all() -> (
+    None
+):
+    """A tenth of what is seen there, or less; of scans tracked rightly hardly anything is."""
+    rightly = [0.0, 0.01, 0.03, 0.0, 0.01]
+    shares = np.array([*rightly, 0.07, 0.07, 0.07, 0.07, 0.1, 0.2, 0.2])
+    assert int(np.argmin(contradictions(shares, P))) == len(rightly)
+
+
 def departure_of(here: int, elsewhere: int, rng: Generator, forget: bool = False) -> Kidnapping:
     """Drive 8 scans a submap; from the last `elsewhere` on in another building than believed.
 

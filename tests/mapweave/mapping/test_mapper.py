@@ -15,7 +15,8 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import write_map
 from mapweave.io.readers import read_reference_poses, read_scans
 from mapweave.mapping.backend import BackendResult, FinishedSubmap
-from mapweave.mapping.mapper import Mapper, Placement
+from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.placement import Placement
 from mapweave.maps import RobotMap, Submap, Trajectory
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import (
@@ -137,6 +138,45 @@ def test_a_placement_says_when_a_submap_was_finished(followed: Run) -> None:
     assert all(p.placed and not p.lost for p in followed.placements)
 
 
+def test_a_placement_says_where_the_scan_is_in_the_component_at_that_time() -> None:
+    scans, _ = scans_along(BUILDING, TOUR[:4], 1)
+    mapper = Mapper("a")
+    for scan in [*scans[:20], *scans[25:]]:  # a gap, after which it has to be found again
+        placement = mapper.add(scan)
+        submaps = mapper.robot_map().submaps
+        at = {
+            int(index): (s, pose)
+            for s in submaps
+            for index, pose in zip(s.trajectory.scan_index, s.trajectory.pose, strict=True)
+        }
+        assert placement.placed == (placement.pose is not None) == (scan.index in at)
+        if placement.pose is not None and placement.uncertainty is not None:
+            submap, pose = at[scan.index]
+            expected = se2.compose(submap.pose, pose)
+            np.testing.assert_allclose(se2.between(expected, placement.pose), 0, atol=1e-9)
+            assert submap.trajectory.uncertainty is not None
+            held = submap.trajectory.uncertainty[submap.trajectory.scan_index == scan.index][0]
+            np.testing.assert_allclose(placement.uncertainty[:3], held[:3])
+            turned = placement.uncertainty[3] - held[3] - submap.pose[2]
+            assert np.sin(turned) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_snapshot_is_drawn_as_the_map_was_then_however_far_the_robot_has_driven_on() -> None:
+    scans, _ = scans_along(BUILDING, TOUR[:5], 1)
+    mapper, then = Mapper("a"), []
+    for scan in scans:
+        mapper.add(scan)
+        if scan.index % 15 == 0:
+            then.append((mapper.snapshot(), mapper.robot_map()))
+    assert len({len(drawn.submaps) for _, drawn in then}) > 1
+    for snapshot, expected in then:
+        drawn = snapshot.robot_map()
+        assert (drawn.version, len(drawn.submaps)) == (expected.version, len(expected.submaps))
+        for submap, other in zip(drawn.submaps, expected.submaps, strict=True):
+            np.testing.assert_array_equal(submap.map.segments, other.map.segments)
+            np.testing.assert_array_equal(submap.trajectory.pose, other.trajectory.pose)
+
+
 def test_a_kidnapped_robot_starts_a_component_where_nothing_fits(kidnapped: Run) -> None:
     assert sum(p.lost for p in kidnapped.placements) >= 1
     where = placed(kidnapped.map)
@@ -251,6 +291,8 @@ class JoinsAll:
         """Take the next submap."""
         self._submaps.append(replace(finished.submap, component=0))
 
+    is_ready = True
+
     def take(self) -> BackendResult:
         """Return where all are."""
         poses = np.array([s.pose for s in self._submaps])
@@ -272,6 +314,28 @@ def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> No
     assert len(numbers) >= 2
     assert numbers == sorted(set(numbers))
     assert mapper.finish().components == [0]
+
+
+class Slow(JoinsAll):
+    """Is not ready until it is told to be; nobody may wait for it."""
+
+    is_ready = False
+
+    def take(self) -> BackendResult:
+        """Fail where somebody waits."""
+        assert self.is_ready, "a scan has waited"
+        return super().take()
+
+
+def test_live_no_scan_waits_for_a_submap_to_be_settled_and_the_next_one_grows_on() -> None:
+    backend = Slow()
+    mapper = Mapper("a", backend=backend, live=True)
+    scans, _ = scans_along(BUILDING, TOUR, 1)
+    for scan in scans[:-1]:
+        assert mapper.add(scan).placed
+    assert len(mapper.robot_map().submaps) == 2  # the first, and one that grows
+    backend.is_ready = True
+    assert mapper.add(scans[-1]).submap_finished
 
 
 class CutsTheSecond:
@@ -302,6 +366,8 @@ class CutsTheSecond:
         components = np.array([s.component for s in self._submaps])
         poses = np.array([s.pose for s in self._submaps])
         self._settled = BackendResult(components, poses, renewed, used)
+
+    is_ready = True
 
     def take(self) -> BackendResult | None:
         """Return where all are."""

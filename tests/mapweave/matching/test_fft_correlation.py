@@ -21,7 +21,7 @@ def marks_of(lines: LineMap) -> Marks:
 def shifts(reference: LineMap, other: LineMap, turn: float, count: int) -> FloatArray:
     """Return where the best shifts put the origin of `other`, turned by `turn` [rad]."""
     parameters = FftCorrelationParameters(shifts=count)
-    found = correlate(marks_of(reference), marks_of(other), np.array([turn]), WEIGHT, parameters)
+    found, _ = correlate(marks_of(reference), marks_of(other), np.array([turn]), WEIGHT, parameters)
     np.testing.assert_array_equal(found[:, 2], turn)
     return found[:, :2]
 
@@ -66,20 +66,20 @@ def test_walls_do_not_match_where_the_other_saw_through() -> None:
 
 def test_without_a_likely_turn_there_is_no_proposal() -> None:
     marks = marks_of(part(BUILDING, 0, 17))
-    assert correlate(marks, marks, np.empty(0), WEIGHT, P).shape == (0, 3)
+    assert correlate(marks, marks, np.empty(0), WEIGHT, P)[0].shape == (0, 3)
 
 
 def test_a_larger_map_gets_coarser_cells() -> None:
     """And the true shift is found all the same."""
     few = FftCorrelationParameters(max_size=60, shifts=5)
     whole, half = marks_of(part(BUILDING, 0, 30)), marks_of(part(BUILDING, 10, 30))
-    found = correlate(whole, half, np.zeros(1), WEIGHT, few)
+    found, _ = correlate(whole, half, np.zeros(1), WEIGHT, few)
     assert np.hypot(*found[:, :2].T).min() < 1.0
 
 
 def test_maps_of_fewer_cells_than_shifts_are_asked_for_get_as_many_as_there_are() -> None:
     """As where the sensor is covered, and all there is lies within a few centimetres."""
     stub = marks_of(line_map(np.array([[0.0, 0, 0.2, 0], [0.2, 0, 0.2, 0.2]])))
-    found = correlate(stub, stub, np.zeros(1), WEIGHT, P)
+    found, _ = correlate(stub, stub, np.zeros(1), WEIGHT, P)
     assert 0 < len(found) < P.shifts
     assert np.hypot(*found[:, :2].T).min() < P.cell

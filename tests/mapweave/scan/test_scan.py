@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -138,3 +139,25 @@ def test_an_increment_turns_the_beam(start: float, increment: float, name: str) 
 def test_no_beams_are_a_blind_scan() -> None:
     nothing: Sequence[float] = []
     assert Scan.of(nothing, 0.0, 0.1).points.shape == (0, 2)
+
+
+@pytest.mark.parametrize("index", ["first", 1.5, None, -2, 2**53 + 1])
+def test_an_index_numbers_a_scan(index: int) -> None:
+    with pytest.raises(ArgumentError, match=r"^index: expected a whole number from 0"):
+        Scan([1, 2], [0, 0.1], index)
+    assert type(Scan([1, 2], [0, 0.1], np.int64(3)).index) is int  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("stamp", ["noon", [1.0, 2.0], np.datetime64("2020-01-01")])
+def test_a_stamp_is_a_time(stamp: float) -> None:
+    with pytest.raises(ArgumentError, match=r"^stamp: expected a time \[s\]"):
+        Scan([1, 2], [0, 0.1], stamp=stamp)
+    assert math.isnan(Scan([1, 2], [0, 0.1], stamp=math.inf).stamp)
+
+
+@pytest.mark.parametrize("name", ["angle_min", "angle_increment", "range_min", "range_max"])
+@pytest.mark.parametrize("value", ["wide", None, [0.1, 0.2], math.nan])
+def test_what_drivers_state_are_numbers(name: str, value: float) -> None:
+    stated: dict[str, Any] = {"angle_min": 0.0, "angle_increment": 0.1, name: value}
+    with pytest.raises(ArgumentError, match=rf"^{name}: expected"):
+        Scan.of([1, 2], **stated)

@@ -12,7 +12,7 @@ from mapweave.mapping.loop_closing import LoopCloser
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason
 from mapweave.team.alignment_graph import Cluster
-from mapweave.team.joint_map import build_team_map
+from mapweave.team.joint_map import fuse
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 from tests.mapweave.buildings import corridor, part, random_pose
 
@@ -52,6 +52,14 @@ def rigid(robot: list[Submap]) -> LineMap:
     return LineMap.union([s.map.moved(s.pose) for s in robot])
 
 
+def bent(robots: dict[str, list[Submap]], poses: dict[str, FloatArray]) -> dict[str, LineMap]:
+    """Return the robots' maps, their submaps where weaving puts them."""
+    return {
+        name: LineMap.union([s.map.moved(t) for s, t in zip(robots[name], those, strict=True)])
+        for name, those in poses.items()
+    }
+
+
 def apart(cluster: Cluster, lines: dict[str, LineMap]) -> FloatArray:
     """(n,) [m] between the same ends of walls in the two robots' maps."""
     first, second = (
@@ -71,15 +79,16 @@ def test_maps_bent_against_each_other_come_to_lie_on_each_other(frames: FloatArr
     cluster, robots, alignments = team(BENT, frames)
     before = apart(cluster, {name: rigid(robot) for name, robot in robots.items()})
     assert before.max() > 0.5
-    woven, lines = WHOLE.weave(cluster, robots, alignments)
-    assert apart(woven, lines).max() < 0.1
+    woven, poses = WHOLE.weave(cluster, robots, alignments)
+    assert apart(woven, bent(robots, poses)).max() < 0.1
     np.testing.assert_array_equal(woven.poses["a/0"], 0.0)
     assert woven.confidence == cluster.confidence
 
 
 def test_maps_that_fit_stay_where_they_are(frames: FloatArray) -> None:
     cluster, robots, alignments = team(0.0, frames)
-    woven, lines = JointOptimizer().weave(cluster, robots, alignments)
+    woven, poses = JointOptimizer().weave(cluster, robots, alignments)
+    lines = bent(robots, poses)
     np.testing.assert_allclose(woven.poses["b/0"], cluster.poses["b/0"], atol=0.02)
     for name, robot in robots.items():
         np.testing.assert_allclose(lines[name].segments, rigid(robot).segments, atol=0.03)
@@ -89,24 +98,26 @@ def test_the_frames_of_the_components_change_nothing(frames: FloatArray) -> None
     distances = []
     for each in (frames, np.zeros((2, 3))):
         cluster, robots, alignments = team(BENT, each)
-        distances.append(apart(*JointOptimizer().weave(cluster, robots, alignments)))
+        woven, poses = JointOptimizer().weave(cluster, robots, alignments)
+        distances.append(apart(woven, bent(robots, poses)))
     np.testing.assert_allclose(distances[0], distances[1], atol=0.02)
 
 
 def test_robots_that_are_nowhere_near_each_other_stay_rigid(frames: FloatArray) -> None:
     cluster, robots, _ = team(BENT, frames)
     far = Cluster({"a/0": np.zeros(3), "b/0": np.array([500.0, 0.0, 0.0])}, cluster.confidence)
-    woven, lines = JointOptimizer().weave(far, robots, [])
+    woven, poses = JointOptimizer().weave(far, robots, [])
     assert woven is far
-    np.testing.assert_array_equal(lines["b/0"].segments, rigid(robots["b/0"]).segments)
+    np.testing.assert_array_equal(poses["b/0"], [s.pose for s in robots["b/0"]])
 
 
 def test_a_submap_that_grows_still_goes_along_with_the_one_before(frames: FloatArray) -> None:
     cluster, robots, alignments = team(BENT, frames)
-    alone, lines = JointOptimizer().weave(cluster, robots, alignments)
+    alone, poses = JointOptimizer().weave(cluster, robots, alignments)
+    lines = bent(robots, poses)
     others = {name: robot[:-1] for name, robot in robots.items()}
     woven, rest = WHOLE.weave(cluster, others, alignments)
-    assert apart(woven, rest).max() < 0.1 < apart(alone, lines).max() < 0.2
+    assert apart(woven, bent(others, rest)).max() < 0.1 < apart(alone, lines).max() < 0.2
 
 
 def test_what_was_compared_once_is_not_compared_again(
@@ -125,7 +136,8 @@ def test_what_is_not_compared_at_once_is_compared_the_next_time(frames: FloatArr
     """A coordinator that starts anew makes a version all the same."""
     cluster, robots, alignments = team(BENT, frames)
     weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=5))
-    before = [apart(*weaver.weave(cluster, robots, alignments)).max() for _ in range(12)]
+    found = [weaver.weave(cluster, robots, alignments) for _ in range(12)]
+    before = [apart(woven, bent(robots, poses)).max() for woven, poses in found]
     assert before[0] > before[-1]
     assert before[-1] < 0.1
 
@@ -143,8 +155,8 @@ def test_three_robots_and_one_that_saw_nothing_are_woven(frames: FloatArray) -> 
         Alignment("a/0", "d/0", there, "accepted", 0.99, Reason.words("so")),
     ]
     poses = {**cluster.poses, "c/0": there, "d/0": there}
-    woven, lines = WHOLE.weave(Cluster(poses, 0.99), everyone, links)
-    assert apart(woven, lines).max() < 0.12
+    woven, own = WHOLE.weave(Cluster(poses, 0.99), everyone, links)
+    assert apart(woven, bent(everyone, own)).max() < 0.12
     assert np.isfinite(np.array(list(woven.poses.values()))).all()
     np.testing.assert_allclose(woven.poses["d/0"], there, atol=0.5)
 
@@ -152,7 +164,7 @@ def test_three_robots_and_one_that_saw_nothing_are_woven(frames: FloatArray) -> 
 def test_a_joint_map_of_bent_robots_has_no_wall_twice(frames: FloatArray) -> None:
     _, robots, alignments = team(BENT / 2, frames)
     maps = [RobotMap(name[0], "boot", 1, tuple(robot)) for name, robot in sorted(robots.items())]
-    (component,) = build_team_map(maps, alignments, 1, WHOLE).components
+    (component,) = fuse(maps, alignments).components
     drawn = np.hypot(*(component.map.segments[:, 2:] - component.map.segments[:, :2]).T).sum()
     true = np.hypot(*np.diff(np.vstack([LONG, LONG[:1]]), axis=0).T).sum()
     assert drawn < 1.03 * true

@@ -26,7 +26,7 @@ def votes(wall: LineMap, confirming: int, denying: int) -> list[DistanceField]:
 
 def sure(walls: np.ndarray, confirming: int, denying: int, support: int = 9) -> float:
     wall = line_map(walls, support=support)
-    views = [(raster, np.zeros(3)) for raster in votes(wall, confirming, denying)]
+    views = [[(raster, np.zeros(3))] for raster in votes(wall, confirming, denying)]
     return float(segment_confidence(wall, views, P)[0])
 
 
@@ -54,9 +54,20 @@ def test_frames_change_nothing(rng: Generator) -> None:
     moved = line_map(ROOM, FREE).moved(se2.inverse(there))
     raster_moved = DistanceField.of(moved, DistanceFieldParameters())
     pose = se2.compose(here, there)
-    before = segment_confidence(wall, [(raster, np.zeros(3))], P)
-    after = segment_confidence(wall.moved(here), [(raster_moved, pose)], P)
+    before = segment_confidence(wall, [[(raster, np.zeros(3))]], P)
+    after = segment_confidence(wall.moved(here), [[(raster_moved, pose)]], P)
     np.testing.assert_allclose(after, before, atol=0.03)
+
+
+def test_the_pieces_of_a_map_have_one_voice() -> None:
+    """A submap that saw a wall, and one that saw through before it was there: no denial."""
+    wall = line_map(PARTITION, support=9)
+    seen, through = votes(wall, 1, 1)
+    still = np.zeros(3)
+    together = segment_confidence(wall, [[(through, still), (seen, still)]], P)
+    assert together == pytest.approx(0.9)
+    twice = [[(through, still), (through, still)], [(seen, still)]]
+    assert segment_confidence(wall, twice, P) == pytest.approx(0.45)
 
 
 def test_no_segments_have_no_confidence() -> None:

@@ -53,6 +53,14 @@ def sent_by(maps: list[RobotMap]) -> list[MapMessage]:
     return [decode(MapMessage, sender.payload(robot_map)) for robot_map in maps]
 
 
+def test_a_sender_knows_its_map_as_it_arrives(random_map: MakeMap) -> None:
+    sender, assembler = MapSender(), MapAssembler()
+    for robot_map in drive(random_map, np.random.default_rng(3), 6):
+        arrived = assembler.update(decode(MapMessage, sender.payload(robot_map)))
+        assert arrived is not None
+        assert plain(sender.as_sent(robot_map)) == plain(arrived)
+
+
 @given(st.integers(0, 2**31), st.data())
 @settings(max_examples=25, deadline=None)
 def test_whatever_is_lost_or_late_no_wrong_map_is_put_together(

@@ -1,6 +1,7 @@
 """Real sessions through a real router in a process of its own."""
 
 import logging
+import math
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -11,7 +12,7 @@ import pytest
 import zenoh
 
 import mapweave_protocol
-from mapweave.errors import InvalidIdError
+from mapweave.errors import ArgumentError, InvalidIdError
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import EndpointError, UnreachableError
 from mapweave_protocol.link.asking import ask_joint_maps, ask_robot_map
@@ -265,6 +266,26 @@ def test_a_full_inbox_drops_the_oldest(endpoint: str, team: str) -> None:
 def test_what_is_no_endpoint_is_refused_at_once(address: str) -> None:
     with pytest.raises(EndpointError), open_session([address]):
         pass
+
+
+@pytest.mark.parametrize("endpoints", [[], [7447], [None]])
+def test_no_endpoint_at_all_is_refused_at_once(endpoints: list[str]) -> None:
+    with pytest.raises(EndpointError, match=r"^endpoint .+: expected"), open_session(endpoints):
+        pass
+
+
+def test_one_endpoint_needs_no_list() -> None:
+    with (
+        pytest.raises(UnreachableError, match=r"at tcp/127\.0\.0\.1:9 "),
+        open_session("tcp/127.0.0.1:9", patience=0.0),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("timeout", [0.0, -1.0, math.nan, "soon"])
+def test_silence_is_waited_for_longer_than_not_at_all(timeout: float) -> None:
+    with pytest.raises(ArgumentError, match=r"^timeout: expected more than 0 s"):
+        next(mapweave_protocol.statuses("rescue", timeout=timeout))
 
 
 def test_a_router_that_does_not_answer_is_named_after_the_patience() -> None:

@@ -14,6 +14,7 @@ from mapweave.reasons import Reason, ReasonKind
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire.codec import DEFLATED, MAX_BODY, PLAIN, decode, encode
+from mapweave_protocol.wire.joint_status_message import Place
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     Compared,
@@ -21,10 +22,12 @@ from mapweave_protocol.wire.messages import (
     JointStatusMessage,
     MapMessage,
     MapVersion,
+    PoseMessage,
     StatusMessage,
     Traffic,
 )
 from mapweave_protocol.wire.model import Message
+from mapweave_protocol.wire.pose_message import JointPose
 from tests.alignment_strategies import alignments as some_alignments
 
 MakeMap = Callable[..., RobotMap]
@@ -71,7 +74,16 @@ def joint_status() -> JointStatusMessage:
     a, b = (MapVersion(robot=robot, boot="x", version=3) for robot in "ab")
     return JointStatusMessage(
         boot="c", stamp=1.7e9, series="s1", version=2, pending=True, maps=(a, b),
-        alignments=((a, b),),
+        alignments=((a, b),), frames={"b/0": Place(frame="a/0", pose=(1.0, 2.0, 3.0))},
+    )  # fmt: skip
+
+
+def pose() -> PoseMessage:
+    covariance = tuple(float(n) for n in range(9))
+    joint = JointPose(frame="a/0", since=3, pose=(4.0, 5.0, 6.0), covariance=covariance)
+    return PoseMessage(
+        robot="b", boot="b1", stamp=1.7e9, sent=1.7e9, scan_index=7, found=True, component="b/1",
+        pose=(1.0, 2.0, 3.0), covariance=covariance, joint=joint,
     )  # fmt: skip
 
 
@@ -82,7 +94,7 @@ def alignments(*found: Alignment) -> AlignmentMessage:
 
 def messages(make_map: MakeMap, make_joint: MakeJoint) -> list[Message]:
     joint = JointMapMessage.pack(make_joint(3), series="s1")
-    return [MapMessage.pack(make_map(1)), joint, status(), joint_status(), alignments()]
+    return [MapMessage.pack(make_map(1)), joint, status(), joint_status(), alignments(), pose()]
 
 
 @pytest.mark.parametrize("angle", [np.pi, -np.pi, 3.1415955, -3.1415955, 7.0, 0.0])

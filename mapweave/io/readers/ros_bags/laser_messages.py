@@ -83,7 +83,8 @@ def _serde_error() -> type[Exception]:
 def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
     """Return the scan; a reading of the maximum, and beyond, is one that did not come back."""
     maximum = laser.range_max
-    measured = laser.ranges.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # NaN of the kind that signals
+        measured = laser.ranges.astype(np.float64)
     if maximum > 0:  # False for NaN; one that is no distance states nothing
         measured = np.where(measured < maximum, measured, np.nan)
     stamp = laser.header.stamp

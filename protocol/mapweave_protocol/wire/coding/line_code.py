@@ -18,7 +18,7 @@ from mapweave.maps import LineMap
 from mapweave_protocol.wire import packing
 from mapweave_protocol.wire.coding.entropy import Coder
 
-PER_METRE = 80  # a step of 12.5 mm: no point moves by more than 9 mm
+PER_METRE = 73  # a step of 13.7 mm: no point moves by more than 9.7 mm
 TURNS = 512  # directions of the frame told apart, in a quarter turn
 SUPPORTS = (0, 1, 2, 3, 5, 8, 16, 32, 64, 128, 256, 512, 1024, 4096, 65536, 2**31)
 CERTAINTIES = 50  # steps of a segment's confidence
@@ -36,7 +36,7 @@ class CodedLines:
     turn
         By how many 512ths of a quarter turn the frame of the numbers is turned.
     segments
-        (n, 4) in steps of 12.5 mm, polyline by polyline.
+        (n, 4) in steps of 1/73 m, polyline by polyline.
     counts
         (m,) how many each polyline has.
     support

@@ -1,6 +1,7 @@
 """Scans on their way from the thread that takes them to the one that maps them."""
 
 import threading
+import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,19 +11,22 @@ from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import ScanSource
 from mapweave.scan.scan import Scan
 
-BACKLOG = 4
-"""Scans that may wait: what a mapper catches up with after it was held up for a moment."""
+BACKLOG = 1
+"""Scans that may wait: a newer one takes the place, so that none is older than a period."""
+
+FAREWELL = 2.0  # [s] for a source to leave its network
 
 
 class LiveScans:
-    """A short queue that never makes a sensor wait: the oldest scan goes where it is full."""
+    """Room for the newest scan, which never makes a sensor wait: an older one makes way."""
 
     def __init__(self, backlog: int = BACKLOG) -> None:
         self._backlog = backlog
-        self._queue: deque[Scan] = deque()
+        self._queue: deque[tuple[Scan, float]] = deque()  # and when each came [s]
         self._changed = threading.Condition()
         self._closed = False
         self._failure: MapweaveError | None = None
+        self._oldest = 0.0
         self.skipped = 0
 
     @property
@@ -43,7 +47,7 @@ class LiveScans:
             if len(self._queue) == self._backlog:
                 self._queue.popleft()
                 self.skipped += 1
-            self._queue.append(scan)
+            self._queue.append((scan, time.monotonic()))
             self._changed.notify_all()
 
     def put_in_turn(self, scan: Scan) -> None:
@@ -51,7 +55,7 @@ class LiveScans:
         with self._changed:
             self._changed.wait_for(lambda: len(self._queue) < self._backlog or self._closed)
             if not self._closed:
-                self._queue.append(scan)
+                self._queue.append((scan, time.monotonic()))
                 self._changed.notify_all()
 
     def take(self, timeout: float) -> Scan | None:
@@ -66,10 +70,18 @@ class LiveScans:
             self._changed.wait_for(lambda: self._queue or self._closed, timeout)
             if self._queue:
                 self._changed.notify_all()
-                return self._queue.popleft()
+                scan, came = self._queue.popleft()
+                self._oldest = max(self._oldest, time.monotonic() - came)
+                return scan
             if self._failure is not None:
                 raise self._failure
             return None
+
+    def oldest(self) -> float:
+        """Return how long a scan waited [s] at most since this was asked last."""
+        with self._changed:
+            oldest, self._oldest = self._oldest, 0.0
+            return oldest
 
     def close(self, failure: MapweaveError | None = None) -> None:
         """Say that no more scans come, and why, where that is a failure."""
@@ -79,23 +91,36 @@ class LiveScans:
 
 
 @contextmanager
-def scans_of(source: ScanSource, selected: ScanRange) -> Iterator[LiveScans]:
-    """Read a live source in a thread of its own; one that writes to a pipe waits for its turn."""
+def scans_of(
+    source: ScanSource, selected: ScanRange, *, skipping: bool = True
+) -> Iterator[LiveScans]:
+    """Read a live source in a thread of its own.
+
+    Parameters
+    ----------
+    skipping
+        Whether scans that come faster than they are taken are left out; otherwise none is, and
+        the source waits for its turn.
+    """
     live = LiveScans()
+    hand_over = live.put if skipping else live.put_in_turn
 
     def read() -> None:
         failure = None
         try:
             for scan in selected.of(source.scans()):
-                live.put_in_turn(scan)
+                hand_over(scan)
         except MapweaveError as error:
             failure = error
         finally:
             live.close(failure)
 
-    # Nothing can wake a thread that waits for a sensor: it ends with the process.
-    threading.Thread(target=read, name="source", daemon=True).start()
+    # Nothing can wake a thread that waits for a pipe: it ends with the process.
+    reader = threading.Thread(target=read, name="source", daemon=True)
+    reader.start()
     try:
         yield live
     finally:
         live.close()
+        source.close()
+        reader.join(FAREWELL)

@@ -1,4 +1,5 @@
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -6,7 +7,7 @@ import pytest
 from mapweave.errors import FileError
 from mapweave.io.scan_range import ScanRange
 from mapweave.scan.scan import Scan
-from mapweave_agent.live_scans import BACKLOG, LiveScans, scans_of
+from mapweave_agent.live.scans import BACKLOG, LiveScans, scans_of
 
 SOON, NEVER = 0.01, 20.0  # [s]
 
@@ -67,10 +68,13 @@ class Source:
         if self._failure is not None:
             raise self._failure
 
+    def close(self) -> None:
+        """It ends by itself."""
 
-def test_who_writes_to_a_pipe_waits_and_no_scan_is_skipped() -> None:
+
+def test_where_nothing_may_be_skipped_a_source_waits_for_its_turn() -> None:
     source = Source(50)
-    with scans_of(source, ScanRange()) as live:
+    with scans_of(source, ScanRange(), skipping=False) as live:
         assert live.take(NEVER) is not None
         assert source.given <= BACKLOG + 3
         assert drain(live) == list(range(1, 50))
@@ -78,12 +82,13 @@ def test_who_writes_to_a_pipe_waits_and_no_scan_is_skipped() -> None:
 
 
 def test_a_range_of_a_live_source_ends_it() -> None:
-    with scans_of(Source(50), ScanRange(2, 5)) as live:
+    with scans_of(Source(50), ScanRange(2, 5), skipping=False) as live:
         assert drain(live) == [2, 3, 4]
 
 
 def test_what_a_source_fails_of_comes_after_its_scans() -> None:
-    with scans_of(Source(2, FileError("log", "is damaged")), ScanRange()) as live:
+    failing = Source(2, FileError("log", "is damaged"))
+    with scans_of(failing, ScanRange(), skipping=False) as live:
         assert [live.take(NEVER), live.take(NEVER)] != [None, None]
         with pytest.raises(FileError, match="log: is damaged"):
             live.take(NEVER)
@@ -91,8 +96,26 @@ def test_what_a_source_fails_of_comes_after_its_scans() -> None:
 
 
 def test_a_reader_that_waits_for_its_turn_ends_when_nobody_takes_scans_any_more() -> None:
-    with scans_of(Source(50), ScanRange()) as live:
+    with scans_of(Source(50), ScanRange(), skipping=False) as live:
         assert live.take(NEVER) is not None
         reader = next(thread for thread in threading.enumerate() if thread.name == "source")
     reader.join(NEVER)
     assert not reader.is_alive()
+
+
+def test_how_long_a_scan_waited_at_most_is_told_once() -> None:
+    live = LiveScans()
+    live.put(scan(0))
+    time.sleep(5 * SOON)
+    assert live.take(NEVER) is not None
+    live.put(scan(1))
+    assert live.take(NEVER) is not None
+    assert live.oldest() >= 5 * SOON
+    assert live.oldest() == 0.0
+
+
+def test_of_scans_that_come_faster_than_they_are_taken_the_newest_is_next() -> None:
+    with scans_of(Source(50), ScanRange()) as live:
+        while not live.ended and live.skipped < 49:
+            time.sleep(SOON)
+        assert drain(live) == [49]

@@ -1,0 +1,1 @@
+"""What an agent does while its robot drives: scans as they come, and where the robot is."""

@@ -1,0 +1,122 @@
+"""What the coordinator hands over to those who look: immutable values, never waited for."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+from mapweave.maps import RobotMap
+from mapweave_protocol.wire.messages import StatusMessage
+
+
+@dataclass(frozen=True, slots=True)
+class RobotReport:
+    """What is known of a robot.
+
+    Attributes
+    ----------
+    robot
+        Its id.
+    runs
+        How many runs of it are alive: one, where nothing is wrong; none when it is gone.
+    status
+        What it said last of itself.
+    heard
+        When it was heard last [s since 1970]; None if not since the coordinator began.
+    map_version
+        Which version of its map is here; None if none is.
+    """
+
+    robot: str
+    runs: int
+    status: StatusMessage | None
+    heard: float | None
+    map_version: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class CoordinatorReport:
+    """How the coordinator is.
+
+    Attributes
+    ----------
+    boot
+        Of this start of it.
+    started, stamp
+        When it began, and when this was said [s since 1970].
+    pending
+        Whether something was received that is in no version yet.
+    refused
+        Messages that were not valid and dropped.
+    """
+
+    boot: str = ""
+    started: float = 0.0
+    stamp: float = 0.0
+    pending: bool = False
+    refused: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """All that was handed over last.
+
+    Attributes
+    ----------
+    version
+        The number of the latest version, 0 when there is none.
+    maps
+        The robots' maps that it was made of, one for each run.
+    """
+
+    version: int = 0
+    maps: tuple[RobotMap, ...] = ()
+    robots: tuple[RobotReport, ...] = ()
+    coordinator: CoordinatorReport = field(default_factory=CoordinatorReport)
+
+
+Listener = Callable[[Seen], object]
+
+
+class Feed:
+    """Keeps what was handed over last, and tells those who listen; usable from several threads.
+
+    A listener is called in the thread of the coordinator, and must return at once.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._seen = Seen()
+        self._listeners: tuple[Listener, ...] = ()
+
+    @property
+    def seen(self) -> Seen:
+        """What was handed over last."""
+        return self._seen
+
+    @contextmanager
+    def heard_by(self, listener: Listener) -> Iterator[None]:
+        """Call `listener` with all there is whenever something is handed over in the block."""
+        with self._lock:
+            self._listeners += (listener,)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._listeners = tuple(one for one in self._listeners if one is not listener)
+
+    def show_version(self, version: int, maps: tuple[RobotMap, ...]) -> None:
+        """Hand over that `version` is in the store, made of `maps`."""
+        with self._lock:
+            self._seen = replace(self._seen, version=version, maps=maps)
+        self._tell()
+
+    def show_team(self, robots: tuple[RobotReport, ...], coordinator: CoordinatorReport) -> None:
+        """Hand over how robots and coordinator are."""
+        with self._lock:
+            self._seen = replace(self._seen, robots=robots, coordinator=coordinator)
+        self._tell()
+
+    def _tell(self) -> None:
+        for listener in self._listeners:
+            listener(self._seen)

@@ -1,0 +1,163 @@
+"""Serves the page from a thread of its own, so that the coordinator's work goes on."""
+
+import os
+import socket
+import threading
+from collections.abc import Awaitable, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+
+from mapweave.config import Config
+from mapweave.errors import ArgumentError
+from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.address import HttpAddress
+from mapweave_fusion_server.web.api import Api
+from mapweave_fusion_server.web.events import Bell
+from mapweave_fusion_server.web.feed import Feed, Seen
+from mapweave_fusion_server.web.guard import Guard
+from mapweave_fusion_server.web.history import History
+from mapweave_fusion_server.web.knowledge import Knowledge
+from mapweave_fusion_server.web.story import StoryTail
+
+STATIC = Path(__file__).with_name("static")
+MAX_CONNECTIONS = 256
+GRACE = 2  # [s] for answers that are under way when the server stops
+
+
+@contextmanager
+def live_page(
+    address: HttpAddress, team: str, store: Store, config: Config, feed: Feed, token: str
+) -> Iterator[HttpAddress]:
+    """Serve what `store` remembers and `feed` is handed while the block lasts.
+
+    Parameters
+    ----------
+    address
+        Where; port 0 takes any.
+    team
+        The team's name.
+    config
+        The coordinator's.
+    token
+        What requests that change something must bring in a header.
+
+    Yields
+    ------
+    HttpAddress
+        The address with its port.
+
+    Raises
+    ------
+    ArgumentError
+        If nothing can be served there.
+    """
+    bell = Bell()
+    with StoryTail(bell.ring) as story:
+        knowledge = Knowledge(team, config, feed, History(store), story)
+        with serving(address, knowledge, bell, token) as bound:
+            yield bound
+
+
+@contextmanager
+def serving(
+    address: HttpAddress, knowledge: Knowledge, bell: Bell, token: str
+) -> Iterator[HttpAddress]:
+    """Serve the page at `address` while the block lasts; give the address with its port.
+
+    Raises
+    ------
+    ArgumentError
+        If nothing can be served there.
+    """
+    listener = _listen(address)
+    bound = HttpAddress(address.host, listener.getsockname()[1])
+    server = uvicorn.Server(_configuration(application(bound, knowledge, bell, token)))
+    thread = threading.Thread(target=server.run, args=([listener],), name="page", daemon=True)
+    with _keeping_up(knowledge, bell):
+        thread.start()
+        try:
+            yield bound
+        finally:
+            bell.close()
+            server.should_exit = True
+            thread.join()
+            listener.close()
+
+
+def application(address: HttpAddress, knowledge: Knowledge, bell: Bell, token: str) -> ASGIApp:
+    """Return the page and the JSON interface, guarded."""
+    routes = [
+        Route("/", _page("index.html")),
+        Route("/api", _page("api.html")),
+        Route("/api/openapi.json", _page("openapi.json")),
+        *Api(knowledge, bell).routes,
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    handlers = {HTTPException: _tell}
+    return Guard(Starlette(routes=routes, exception_handlers=handlers), address, token)
+
+
+@contextmanager
+def _keeping_up(knowledge: Knowledge, bell: Bell) -> Iterator[None]:
+    """Keep the paths of each version that is handed over, beside the coordinator, and ring."""
+
+    def keep(seen: Seen) -> None:
+        if seen.version > knowledge.paths.latest:
+            knowledge.paths.keep(seen.version, seen.maps)
+        bell.ring()
+
+    with (
+        ThreadPoolExecutor(1, thread_name_prefix="paths") as worker,
+        knowledge.feed.heard_by(lambda seen: worker.submit(keep, seen)),
+    ):
+        worker.submit(keep, knowledge.feed.seen)
+        yield
+
+
+def _page(name: str) -> Callable[[Request], Awaitable[Response]]:
+    async def answer(_request: Request) -> Response:
+        return FileResponse(STATIC / name, headers={"Cache-Control": "no-cache"})
+
+    return answer
+
+
+async def _tell(_request: Request, error: Exception) -> Response:
+    """Answer with one line that says what is wrong."""
+    status = error.status_code if isinstance(error, HTTPException) else 500
+    detail = error.detail if isinstance(error, HTTPException) else "failed"
+    return PlainTextResponse(f"{detail}\n", status)
+
+
+def _listen(address: HttpAddress) -> socket.socket:
+    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+    try:
+        return socket.create_server((address.host, address.port), family=family)
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise ArgumentError("--http", f"{address.authority}: {why}") from error
+
+
+def _configuration(app: ASGIApp) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        http="h11",
+        ws="none",
+        loop="asyncio",
+        lifespan="off",
+        log_config=None,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        limit_concurrency=MAX_CONNECTIONS,
+        timeout_graceful_shutdown=GRACE,
+    )

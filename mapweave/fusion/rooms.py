@@ -1,0 +1,126 @@
+"""Rooms: whether two maps agree about more than one room.
+
+Rooms are built alike. Two maps that agree about all of one closed room agree about one thing,
+however often it was driven through: the room may exist twice, and only what lies outside tells.
+"""
+
+import math
+
+import numpy as np
+import scipy
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.matching.distance_field import DistanceField
+from mapweave.matching.verification import VerificationParameters, coinciding
+
+
+class RoomParameters(BaseModel):
+    """What a room is, and what one room alone proves."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    passage: float = Field(
+        0.5,
+        gt=0,
+        description="[m] of free space to both sides of the middle of a passage that joins two"
+        " parts of one room; less is a door, of which free space keeps 0.1 m to both sides",
+    )
+    coarse: int = Field(2, ge=1, description="cells of the raster in one that rooms are told by")
+    max_extent: float = Field(
+        9.0,
+        gt=0,
+        description="[m] a longer one is a corridor, a hall or a laboratory such as those of Intel,"
+        " of 10 to 12 m, and seldom built twice; offices, classrooms and rooms of hotels are not",
+    )
+    min_outside: float = Field(
+        4.0, ge=0, description="[m] of wall in common outside of the room that tell which it is"
+    )
+    unique: float = Field(
+        0.8, gt=0, le=1, description="probability that a room has no twin within reach of the team"
+    )
+
+
+def outside(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    verification: VerificationParameters,
+    parameters: RoomParameters,
+) -> float:
+    """Return the metres of wall in common that lie outside of one room.
+
+    Infinite where what most of it is in is no room, but a corridor or a hall, by either map: the
+    other may have seen a part of it. Otherwise the less counts, for one of them may have seen more
+    through the door.
+
+    Parameters
+    ----------
+    reference, other
+        The two maps.
+    transform
+        (3,) from `other` to `reference` [m, m, rad].
+    verification, parameters
+        When walls coincide, and what a room is.
+    """
+    p, back = parameters, se2.inverse(transform)
+    both = (
+        _outside(reference, other, transform, verification, p),
+        _outside(other, reference, back, verification, p),
+    )
+    return math.inf if math.inf in both else min(both)
+
+
+def _outside(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    verification: VerificationParameters,
+    p: RoomParameters,
+) -> float:
+    """Count by the rooms of `reference`."""
+    nearest, extents = _rooms(reference, p)
+    if len(extents) == 0:
+        return math.inf
+    shared = coinciding(reference, other, transform, verification)
+    walls = other.oriented.at(shared).moved(transform)
+    # A wall is of the room that it faces.
+    before = walls.points + p.passage * walls.normals
+    cell = p.coarse * reference.cell
+    index = np.floor((before - reference.origin) / cell).astype(np.int64)
+    i, j = np.clip(index, 0, np.array(nearest.shape) - 1).T
+    inside = np.bincount(nearest[i, j], other.weight[shared], len(extents))
+    most = int(np.argmax(inside))
+    return float(inside.sum() - inside[most]) if extents[most] <= p.max_extent else math.inf
+
+
+def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArray]:
+    """Return (rows, columns) the number of the room nearest to each coarse cell; (k,) extents [m].
+
+    Rooms are what free space falls apart into where passages are closed that are no wider than a
+    door; an extent is the longer side of one, by how far it spreads.
+    """
+    rows, columns = (n // p.coarse for n in raster.depth.shape)
+    cut = raster.depth[: rows * p.coarse, : columns * p.coarse]
+    depth = cut.reshape(rows, p.coarse, columns, p.coarse).max(axis=(1, 3))
+    found, count = scipy.ndimage.label(depth > p.passage, np.ones((3, 3)))
+    label = np.asarray(found, dtype=np.int64)
+    if count == 0:
+        return np.zeros((rows, columns), dtype=np.int64), np.empty(0)
+    away = scipy.ndimage.distance_transform_edt(
+        label == 0, return_distances=False, return_indices=True
+    )
+    return label[tuple(away)] - 1, _extents(label, count) * p.coarse * raster.cell + 2 * p.passage
+
+
+def _extents(label: IntArray, count: int) -> FloatArray:
+    """(count,) longer sides [cells] of rectangles that spread as the parts of `label` do."""
+    i, j = np.nonzero(label)
+    part = label[i, j] - 1
+    area = np.bincount(part, minlength=count)
+    mean = [np.bincount(part, x, count) / area for x in (i, j)]
+    u, v = i - mean[0][part], j - mean[1][part]
+    uu, vv, uv = (np.bincount(part, x, count) / area for x in (u * u, v * v, u * v))
+    greatest = (uu + vv) / 2 + np.hypot((uu - vv) / 2, uv)
+    return np.asarray(np.sqrt(12 * greatest), dtype=np.float64)

@@ -1,0 +1,101 @@
+"""Versions of the joint map, each built from what has changed since the one before.
+
+What is made of a submap, of a component, or of two of them, is kept as long as they stay as they
+are: rasters, what they say of each other, which submaps fit. All that is kept is what would be made
+anew of the same: so a version is the same whatever was built before.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from mapweave.maps import (
+    Alignment,
+    JointComponent,
+    JointMap,
+    LineMap,
+    RobotMap,
+    Submap,
+    lines_of,
+    submaps_by_component,
+)
+from mapweave.matching.distance_field import DistanceField
+from mapweave.team.alignment_graph import Cluster, cluster_components
+from mapweave.team.contradictions import KnownVerdicts
+from mapweave.team.joining import JointParameters, Kept, Piece, join
+from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
+from mapweave.team.recent import Recent
+
+
+class JointMapBuilder:
+    """Builds one version after the other of what a team knows.
+
+    Parameters
+    ----------
+    parameters
+        Of how maps become one.
+    weaving
+        Of how submaps are moved to where they fit.
+    """
+
+    def __init__(
+        self,
+        parameters: JointParameters | None = None,
+        weaving: JointOptimizationParameters | None = None,
+    ) -> None:
+        self.parameters = parameters or JointParameters()
+        self._weaver = JointOptimizer(weaving)
+        self._wholes: Recent[tuple[tuple[LineMap, bytes], ...], DistanceField | None] = Recent()
+        self._rasters: Recent[LineMap, DistanceField | None] = Recent()
+        self._verdicts: KnownVerdicts = Recent()
+        self._kept = Kept()
+
+    def build(
+        self, maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int
+    ) -> JointMap:
+        """Return what the team knows, its robots' submaps woven together.
+
+        Alignments that contradict others, or what robots saw, are set aside: they stay in the joint
+        map as ambiguous, the reason saying so.
+        """
+        for kept in (self._wholes, self._rasters, self._verdicts, self._kept):
+            kept.turn()
+        submaps = submaps_by_component(maps)
+        found = {name: self._whole(each) for name, each in submaps.items()}
+        rasters = {name: raster for name, raster in found.items() if raster is not None}
+        clusters, judged = cluster_components(
+            sorted(submaps), alignments, self.parameters.graph, rasters, self._verdicts
+        )
+        joined = tuple(self._join(cluster, submaps, judged) for cluster in clusters)
+        return JointMap(version, joined, judged)
+
+    def _whole(self, submaps: Sequence[Submap]) -> DistanceField | None:
+        """Return the raster of a component; None where it has seen no wall."""
+        key = tuple((s.map, s.pose.tobytes()) for s in submaps)
+        return self._wholes.get(key, lambda: rasterise(lines_of(submaps), self.parameters))
+
+    def _join(
+        self,
+        cluster: Cluster,
+        submaps: Mapping[str, Sequence[Submap]],
+        judged: Sequence[Alignment],
+    ) -> JointComponent:
+        """Join a cluster, its submaps where they fit; a component alone stays as it is."""
+        poses = {name: [s.pose for s in submaps[name]] for name in cluster.poses}
+        if len(cluster.poses) > 1:
+            cluster, woven = self._weaver.weave(cluster, submaps, judged)
+            poses = {name: list(those) for name, those in woven.items()}
+        pieces = {
+            name: [
+                Piece(s.map, self._raster(s.map), pose)
+                for s, pose in zip(submaps[name], those, strict=True)
+            ]
+            for name, those in poses.items()
+        }
+        return join(cluster, pieces, self.parameters, self._kept)
+
+    def _raster(self, lines: LineMap) -> DistanceField | None:
+        return self._rasters.get(lines, lambda: rasterise(lines, self.parameters))
+
+
+def rasterise(lines: LineMap, p: JointParameters) -> DistanceField | None:
+    """Return the raster of `lines`; None where there is no wall."""
+    return DistanceField.of(lines, p.raster) if len(lines.segments) else None

@@ -1,0 +1,60 @@
+"""``sensor_msgs/LaserScan`` off the wire, to a scan; what is none is refused in words."""
+
+from mapweave.errors import MissingExtraError
+from mapweave.io.readers.ros_bags.laser_messages import (
+    CDR,
+    LASER_SCAN,
+    LaserDecoder,
+    Message,
+    UnreadableMessageError,
+)
+from mapweave.scan.scan import Scan
+from mapweave_ros.topics import DDS_LASER_SCAN
+
+MAX_BYTES = 2**20  # of a message: ten thousand beams and their intensities are a tenth of it
+MIN_BEAMS = 10  # fewer show no wall
+
+
+class ScanMessages:
+    """Decodes the messages of lasers.
+
+    Raises
+    ------
+    MissingExtraError
+        If `rosbags` is not installed.
+    """
+
+    def __init__(self) -> None:
+        try:
+            self._decoder = LaserDecoder()
+        except ImportError as error:
+            raise MissingExtraError("a ROS 2 topic", "ros2") from error
+
+    def scan(self, topic: str, dds_type: str | None, payload: bytes, index: int) -> Scan:
+        """Return the scan in `payload`.
+
+        Parameters
+        ----------
+        dds_type
+            As the key says it; None where it does not.
+        index
+            The scan's.
+
+        Raises
+        ------
+        UnreadableMessageError
+            If there is none; its text says why.
+        """
+        if dds_type not in (None, DDS_LASER_SCAN):
+            raise UnreadableMessageError(f"is a {dds_type}; expected a {DDS_LASER_SCAN}")
+        if len(payload) > MAX_BYTES:
+            raise UnreadableMessageError(f"has {len(payload)} bytes; expected at most {MAX_BYTES}")
+        try:
+            scan = self._decoder.scan(Message(topic, LASER_SCAN, CDR, payload), index)
+        except (AssertionError, TypeError, MemoryError) as error:  # what rosbags makes of noise
+            raise UnreadableMessageError("is no LaserScan") from error
+        if len(scan.ranges) < MIN_BEAMS:
+            raise UnreadableMessageError(
+                f"has {len(scan.ranges)} beams; expected {MIN_BEAMS} or more"
+            )
+        return scan

@@ -1,0 +1,306 @@
+"""What a person sees, in a real browser."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, expect
+from playwright.sync_api import Page as Tab
+
+from mapweave.config import Config
+from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap
+from mapweave_fusion_server import journal
+from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.address import HttpAddress
+from mapweave_fusion_server.web.feed import CoordinatorReport, Feed, RobotReport
+from mapweave_fusion_server.web.server import live_page
+from tests.fusion_server.web.browser import Visit, chromium, visit
+from tests.fusion_server.web.conftest import TOKEN, Page, make_joint
+
+pytestmark = pytest.mark.slow
+HOSTILE = "<img src=x onerror=alert(1)></script><b id=bold>"
+MakeMap = Callable[..., RobotMap]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture
+def seen(browser: Browser, page: Page) -> Iterator[Visit]:
+    """Return a visit of a page of which nothing is known yet; in the end it was well-behaved."""
+    with visit(browser, page.address.url(TOKEN)) as seen:
+        expect(seen.tab.locator("#live")).to_have_text("live")
+        yield seen
+        assert seen.said == []
+        assert {urlsplit(url).netloc for url in seen.asked} == {page.address.authority}
+
+
+def apart(version: int, lines: LineMap, *names: str) -> JointMap:
+    """Return a version in which nobody is joined to anybody."""
+    sure = np.ones(len(lines.segments))
+    places = [{f"{name}/0": np.zeros(3)} for name in names]
+    return JointMap(version, tuple(JointComponent(place, 1.0, lines, sure) for place in places), ())
+
+
+def expect_version(tab: Tab, version: int) -> None:
+    expect(tab.locator("#map")).to_have_attribute("data-version", str(version))
+
+
+def picture(tab: Tab) -> bytes:
+    return tab.locator("#map").screenshot()
+
+
+def test_the_map_appears_and_grows(page: Page, seen: Visit, lines: LineMap) -> None:
+    headline = seen.tab.locator("#headline")
+    expect(headline).to_have_text("Waiting for the first map…")
+    empty = picture(seen.tab)
+    page.publish(make_joint(1, lines, a=0.0))
+    expect(headline).to_have_text("1 robot in 1 component")
+    expect_version(seen.tab, 1)
+    assert picture(seen.tab) != empty
+    page.publish(make_joint(2, lines, a=0.0, b=3.0))
+    expect(headline).to_have_text("2 robots in 1 component, 97% sure")
+    expect(seen.tab.locator("#version-text")).to_contain_text("Version 2 of 2")
+
+
+def test_components_move_together_before_ones_eyes(page: Page, seen: Visit, lines: LineMap) -> None:
+    page.publish(apart(1, lines, "a", "b"))
+    expect(seen.tab.locator("#headline")).to_have_text(
+        "2 robots in 2 components, not joined to each other"
+    )
+    seen.tab.evaluate(RECORD_MOVES)
+    page.publish(make_joint(2, lines, a=0.0, b=0.0))
+    expect_version(seen.tab, 2)
+    seen.tab.wait_for_timeout(2000)
+    assert seen.tab.evaluate("window.placesDrawn.size") > 8  # each component, on its way
+    still = picture(seen.tab)
+    seen.tab.wait_for_timeout(300)
+    assert picture(seen.tab) == still
+
+
+RECORD_MOVES = """() => {
+  window.placesDrawn = new Set();
+  const original = CanvasRenderingContext2D.prototype.setTransform;
+  CanvasRenderingContext2D.prototype.setTransform = function (...all) {
+    window.placesDrawn.add(`${Math.round(all[4])} ${Math.round(all[5])}`);
+    return original.apply(this, all);
+  };
+}"""
+
+
+def test_the_slider_goes_back_and_the_map_is_that_versions(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    page.publish(apart(1, lines, "a", "b"))
+    expect_version(seen.tab, 1)
+    page.publish(make_joint(2, lines, a=0.0, b=3.0))
+    expect_version(seen.tab, 2)
+    seen.tab.locator("#version").fill("1")
+    expect_version(seen.tab, 1)
+    expect(seen.tab.locator("#headline")).to_contain_text("2 components")
+    page.publish(make_joint(3, lines, a=0.0, b=3.0))  # who looks back is left there
+    expect(seen.tab.locator("#version-text")).to_contain_text("Version 1 of 3")
+    assert seen.tab.evaluate("location.hash") == "#v=1"
+    seen.tab.locator("#latest").click()
+    expect_version(seen.tab, 3)
+
+
+def test_a_link_leads_to_a_version_and_holds_no_token(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    for version in (1, 2, 3):
+        page.publish(make_joint(version, lines, a=0.0))
+    expect_version(seen.tab, 3)
+    assert TOKEN not in seen.tab.url
+    seen.tab.goto("about:blank")
+    seen.tab.goto(page.address.url() + "#v=2")
+    expect_version(seen.tab, 2)
+    expect(seen.tab.locator("#downloads a")).to_have_text(["SVG", "PNG", "GEOJSON", "DXF", "JSON"])
+    with seen.tab.expect_download() as download:
+        seen.tab.locator("#downloads a", has_text="JSON").last.click()
+    assert json.loads(Path(download.value.path()).read_text())["version"] == 2
+
+
+def test_what_differs_between_two_versions_is_told(page: Page, seen: Visit, lines: LineMap) -> None:
+    page.publish(make_joint(1, replace_segments(lines, 4), a=0.0))
+    page.publish(make_joint(2, lines, a=0.0))
+    expect_version(seen.tab, 2)
+    plain = picture(seen.tab)
+    seen.tab.locator("#compare").select_option("1")
+    expect(seen.tab.locator("#legend")).to_contain_text("only in version 2")
+    seen.tab.wait_for_timeout(300)
+    assert picture(seen.tab) != plain
+
+
+def replace_segments(lines: LineMap, count: int) -> LineMap:
+    """Return the first `count` segments."""
+    return LineMap(
+        lines.segments[:count], lines.polyline[:count], lines.support[:count], lines.free_space
+    )
+
+
+def test_a_robot_that_is_killed_is_gone(page: Page, seen: Visit, make_map: MakeMap) -> None:
+    robot_map = make_map("a")
+    page.publish(make_joint(1, robot_map.lines(0), a=0.0), (robot_map,))
+    page.feed.show_team((RobotReport("a", 1, None, 5.0, 1),), CoordinatorReport(stamp=5.0))
+    row = seen.tab.locator("#team tbody tr")
+    expect(row).to_contain_text("● here")
+    expect(seen.tab.locator("#legend")).not_to_contain_text("gone")
+    page.feed.show_team((RobotReport("a", 0, None, 5.0, 1),), CoordinatorReport(stamp=9.0))
+    expect(row).to_contain_text("○ gone")
+    expect(row).to_contain_text("4 s ago")
+    expect(seen.tab.locator("#legend")).to_contain_text("robot that is gone")
+
+
+def test_hostile_text_is_shown_as_text(
+    page: Page, seen: Visit, lines: LineMap, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    page.publish(make_joint(1, lines, reason=HOSTILE, a=0.0, b=1.0))
+    journal.record([HOSTILE])
+    expect(seen.tab.locator("#decisions")).to_contain_text(HOSTILE)
+    expect(seen.tab.locator("#story")).to_contain_text(HOSTILE)
+    assert seen.tab.locator("main img, #bold").count() == 0
+
+
+def test_the_page_goes_on_by_itself_when_the_coordinator_is_started_again(
+    browser: Browser, tmp_path: Path, lines: LineMap
+) -> None:
+    with Store(tmp_path / "store.sqlite", "team") as store:
+        feed = Feed()
+        with live_page(
+            HttpAddress("127.0.0.1", 0), "team", store, Config(), feed, TOKEN
+        ) as address:
+            Page(address, store, feed).publish(make_joint(1, lines, a=0.0))
+            context = visit(browser, address.url())
+            seen = context.__enter__()
+            expect_version(seen.tab, 1)
+        expect(seen.tab.locator("#stale")).to_be_visible()
+        expect(seen.tab.locator("#live")).to_have_text("no contact")
+        feed = Feed()
+        feed.show_version(1, ())
+        with live_page(address, "team", store, Config(), feed, TOKEN):
+            Page(address, store, feed).publish(make_joint(2, lines, a=0.0, b=1.0))
+            expect(seen.tab.locator("#live")).to_have_text("live")
+            expect(seen.tab.locator("#stale")).to_be_hidden()
+            expect_version(seen.tab, 2)
+            context.__exit__(None, None, None)
+
+
+def test_a_decision_shows_what_speaks_for_it_and_against(
+    page: Page, seen: Visit, make_map: MakeMap
+) -> None:
+    maps = make_map("a"), make_map("b")
+    page.publish(make_joint(1, maps[0].lines(0), a=0.0, b=0.0), maps)
+    decision = seen.tab.locator(".decision")
+    expect(decision).to_have_count(1)
+    decision.hover()
+    evidence = seen.tab.locator("#evidence")
+    expect(evidence.locator("canvas")).to_have_count(1)
+    expect(evidence).to_contain_text("Nothing different fits")
+    seen.tab.mouse.move(10, 10)
+    expect(evidence).to_be_hidden()
+    decision.focus()
+    seen.tab.keyboard.press("Enter")
+    expect(evidence).to_be_visible()
+    seen.tab.keyboard.press("Escape")
+    expect(evidence).to_be_hidden()
+
+
+def test_what_has_the_focus_keeps_it_while_the_map_grows(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    """As does what is being clicked at that moment."""
+    page.publish(make_joint(1, lines, a=0.0, b=1.0))
+    page.feed.show_team((RobotReport("a", 1, None, 5.0, 1),), CoordinatorReport(stamp=5.0))
+    for focused in (".decision", "#team button", "#compare", "#downloads a"):
+        expect(seen.tab.locator(focused).first).to_be_visible()
+        seen.tab.locator(focused).first.focus()
+        page.publish(make_joint(page.store.latest_version + 1, lines, a=0.0, b=1.0, c=2.0))
+        page.feed.show_team((RobotReport("a", 1, None, 6.0, 1),), CoordinatorReport(stamp=9.0))
+        expect_version(seen.tab, page.store.latest_version)
+        expect(seen.tab.locator("#team")).to_contain_text("3 s ago")
+        assert seen.tab.evaluate("document.activeElement.matches('" + focused + "')"), focused
+
+
+def test_a_distance_is_measured_by_mouse_and_by_keys(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    """The room of 9 m by 7 m: from one end of its longest wall to the other."""
+    page.publish(make_joint(1, lines, a=0.0))
+    expect_version(seen.tab, 1)
+    canvas = seen.tab.locator("#map")
+    canvas.focus()
+    seen.tab.keyboard.press("m")
+    seen.tab.keyboard.press("Enter")
+    expect(seen.tab.locator("#measured")).to_have_text("Click the second point")
+    for _ in range(3):
+        seen.tab.keyboard.press("ArrowRight")
+    seen.tab.keyboard.press("Enter")
+    expect(seen.tab.locator("#measured")).to_contain_text(" m")
+    by_keys = float(seen.tab.locator("#measured").inner_text().split()[0])
+    assert 0 < by_keys < 9
+    seen.tab.keyboard.press("Escape")
+    expect(seen.tab.locator("#measured")).to_be_hidden()
+
+
+def test_keys_move_zoom_and_turn_the_map_and_fit_it_again(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    page.publish(make_joint(1, lines, a=0.0))
+    expect_version(seen.tab, 1)
+    seen.tab.wait_for_timeout(200)
+    fitted = picture(seen.tab)
+    seen.tab.locator("#map").focus()
+    seen.tab.wait_for_timeout(200)
+    focused = picture(seen.tab)
+    for key in ("ArrowLeft", "+", "[", "-"):
+        before = picture(seen.tab)
+        seen.tab.keyboard.press(key)
+        seen.tab.wait_for_timeout(150)
+        assert picture(seen.tab) != before, key
+    for key in ("0", "f"):
+        seen.tab.keyboard.press(key)
+    seen.tab.wait_for_timeout(200)
+    assert picture(seen.tab) == focused or picture(seen.tab) == fitted
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("phone", [False, True])
+def test_people_who_cannot_see_it_or_use_no_mouse_can_use_it(
+    browser: Browser, page: Page, make_map: MakeMap, *, dark: bool, phone: bool
+) -> None:
+    """As far as axe can tell; with everything open that can be."""
+    maps = make_map("a"), make_map("b")
+    joint = make_joint(1, maps[0].lines(0), a=0.0, b=0.0)
+    alone = JointComponent({"c/0": np.zeros(3)}, 1.0, maps[0].lines(0), np.full(6, 0.5))
+    page.publish(replace(joint, components=(*joint.components, alone)), maps)
+    page.feed.show_team((RobotReport("a", 1, None, 5.0, 1),), CoordinatorReport(stamp=5.0))
+    with visit(browser, page.address.url(), dark=dark, phone=phone) as seen:
+        expect(seen.tab.locator("#team tbody tr")).to_have_count(2)
+        seen.tab.locator(".decision").first.click()
+        expect(seen.tab.locator("#evidence canvas")).to_have_count(1)
+        found = Axe().run(seen.tab)
+        assert found.violations_count == 0, found.generate_report()
+        seen.tab.goto(page.address.url() + "api")
+        expect(seen.tab.locator("section")).to_have_count(11)
+        found = Axe().run(seen.tab)
+        assert found.violations_count == 0, found.generate_report()
+        assert seen.said == []
+
+
+def test_on_a_phone_nothing_is_wider_than_the_screen(
+    browser: Browser, page: Page, lines: LineMap
+) -> None:
+    page.publish(make_joint(1, lines, a=0.0, b=1.0))
+    with visit(browser, page.address.url(), phone=True) as seen:
+        expect_version(seen.tab, 1)
+        assert seen.tab.evaluate("document.documentElement.scrollWidth") <= 390

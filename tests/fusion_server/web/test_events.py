@@ -1,0 +1,94 @@
+"""What changes is told as it changes, and nothing twice or not at all."""
+
+import json
+from itertools import islice
+
+import pytest
+
+from mapweave.maps import LineMap
+from mapweave_fusion_server import journal
+from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
+from mapweave_fusion_server.web.parts import Paths
+from tests.fusion_server.web.conftest import Page, make_joint
+
+
+def publish(page: Page, lines: LineMap, first: int, last: int) -> None:
+    for version in range(first, last + 1):
+        page.publish(make_joint(version, lines, a=0.0))
+
+
+def test_who_comes_first_hears_the_latest_version_and_each_that_follows(
+    page: Page, lines: LineMap
+) -> None:
+    publish(page, lines, 1, 3)
+    with page.events() as events:
+        versions = (event for event in events if event["event"] == "version")
+        assert next(versions)["id"] == "3"
+        publish(page, lines, 4, 6)
+        assert [event["id"] for event in islice(versions, 3)] == ["4", "5", "6"]
+
+
+@pytest.mark.parametrize("had", [1, 4, 7])
+def test_who_comes_again_hears_all_that_was_missed_in_order(
+    page: Page, lines: LineMap, had: int
+) -> None:
+    publish(page, lines, 1, 7)
+    with page.events({"Last-Event-ID": str(had)}) as events:
+        versions = (event for event in events if event["event"] == "version")
+        publish(page, lines, 8, 9)
+        heard = [int(event["id"]) for event in islice(versions, 9 - had)]
+        assert heard == list(range(had + 1, 10))
+
+
+@pytest.mark.parametrize("had", ["99", "x", "-1", "1 2"])
+def test_who_has_a_version_of_another_store_hears_the_latest(
+    page: Page, lines: LineMap, had: str
+) -> None:
+    publish(page, lines, 1, 2)
+    with page.events({"Last-Event-ID": had}) as events:
+        first = next(event for event in events if event["event"] == "version")
+    assert json.loads(first["data"])["version"] == 2
+    assert json.loads(first["data"])["series"] == page.store.series
+
+
+def test_reports_and_lines_are_told_without_an_id(
+    page: Page, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    with page.events() as events:
+        assert next(events)["event"] == "team"
+        journal.record(["r1 is here"])
+        story = next(event for event in events if event["event"] == "story")
+        page.feed.show_team((), CoordinatorReport(stamp=5.0))
+        team = next(event for event in events if event["event"] == "team")
+    assert json.loads(story["data"])["lines"][0]["text"] == "r1 is here"
+    assert json.loads(team["data"])["coordinator"]["stamp"] == 5.0
+    assert "id" not in story
+    assert "id" not in team
+
+
+def test_paths_are_there_when_their_version_is_told(page: Page, lines: LineMap) -> None:
+    with page.events() as events:
+        versions = (event for event in events if event["event"] == "version")
+        for version in range(1, 6):
+            publish(page, lines, version, version)
+            number = next(versions)["id"]
+            assert page.ask(f"/api/joint/{number}/paths").json["kept"] is True
+
+
+def test_paths_of_old_versions_go_when_there_are_too_many() -> None:
+    paths = Paths(limit=400)
+    for version in range(1, 50):
+        paths.keep(version, ())
+    assert paths.latest == 49
+    assert paths.json(49) is not None
+    assert paths.json(1) is None
+
+
+def test_who_no_longer_listens_is_not_told() -> None:
+    feed, heard = Feed(), []
+    with feed.heard_by(lambda seen: heard.append(seen.version)):
+        feed.show_version(1, ())
+    feed.show_version(2, ())
+    assert heard == [1]
+    assert feed.seen.version == 2

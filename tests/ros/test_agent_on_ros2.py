@@ -1,0 +1,144 @@
+"""``mapweave agent --source ros2:…`` as a real process, beside lasers that talk as ROS 2 does."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mapweave.scan.scan import Scan
+from mapweave_protocol.link.session import open_session
+from tests.agent.test_agent import MAPWEAVE, PATIENCE, Listener
+from tests.agent.test_own_agent import assert_mapped, scans_of
+from tests.ros.lasers import HUMBLE_HASH, as_message, laser, laser_scan, native_key
+
+PEER = Path(__file__).with_name("peer.py")
+FORMS = {
+    "jazzy": (native_key("/scan"), True),
+    "humble": (native_key("/scan", type_hash=HUMBLE_HASH), True),
+    "without attachment": (native_key("/scan"), False),
+    "bridge": ("scan", False),
+}
+
+
+@contextmanager
+def agent(
+    endpoint: str, team: str, source: str, *options: str
+) -> Iterator["subprocess.Popen[str]"]:
+    """Run an agent for the length of a block."""
+    where = ["--robot", "a", "--team", team, "--connect", endpoint, "--source", source, *options]
+    with subprocess.Popen(
+        [MAPWEAVE, "agent", *where], stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_scans_of_ros_2_are_mapped_as_their_log_is(
+    form: str, endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans = scans_of(logs[0])
+    key, attached = FORMS[form]
+    with (
+        open_session([endpoint], patience=PATIENCE) as session,
+        laser(endpoint, key, attached=attached) as sensor,
+        agent(endpoint, team, "ros2:/scan", "--rate", "max", "--scans", f":{len(scans)}"),
+    ):
+        listener = Listener(session, team)
+        sensor.wait_for_listener()
+        for scan in scans:
+            sensor.say(as_message(scan))
+        listener.until(lambda: listener.finished("a"))
+    assert_mapped(listener.maps["a"], scans)
+    assert listener.statuses["a"].scans_seen == len(scans)
+
+
+def test_an_independent_ros_2_peer_is_mapped_as_its_log_is(
+    endpoint: str, team: str, logs: list[Path], tmp_path: Path
+) -> None:
+    scans = scans_of(logs[0])
+    host, port = endpoint.removeprefix("tcp/").split(":")
+    peer = [sys.executable, str(PEER), host, port, str(tmp_path / "messages"), str(logs[0])]
+    options = "--rate", "max", "--scans", f":{len(scans)}"
+    with (
+        open_session([endpoint], patience=PATIENCE) as session,
+        agent(endpoint, team, "ros2:/scan?domain=7", *options),
+    ):
+        listener = Listener(session, team)
+        with subprocess.Popen(peer) as process:
+            listener.until(lambda: listener.finished("a"))
+            process.kill()
+    assert_mapped(listener.maps["a"], scans)
+
+
+def test_ctrl_c_ends_an_agent_that_still_waits_for_scans(endpoint: str, team: str) -> None:
+    with (
+        open_session([endpoint], patience=PATIENCE) as session,
+        agent(endpoint, team, "ros2:/scan?domain=9") as process,
+    ):
+        listener = Listener(session, team)
+        listener.until(lambda: "a" in listener.statuses)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+        assert process.stderr is not None
+        assert "Traceback" not in process.stderr.read()
+
+
+def test_ctrl_c_ends_an_agent_whose_ros_2_router_is_not_there(endpoint: str, team: str) -> None:
+    with (
+        open_session([endpoint], patience=PATIENCE) as session,
+        agent(endpoint, team, "ros2:/scan?connect=tcp/127.0.0.1:1") as process,
+    ):
+        listener = Listener(session, team)
+        listener.until(lambda: "a" in listener.statuses)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+
+
+def as_odd_messages(scans: list[Scan]) -> Iterator[bytes]:
+    """Yield scans, each written as another sensor would, and between them what is none."""
+    for index, scan in enumerate(scans):
+        start, step = float(scan.angles[0]), float(scan.angles[1] - scan.angles[0])
+        lost = (0.0, np.inf, np.nan, 30.0)[index % 4]
+        ranges = np.where(scan.hits, scan.ranges, lost)
+        maximum = 30.0 if lost == 30.0 else 100.0
+        stamp = (scan.stamp, 0.0, -1.0, 1e9)[index % 4]
+        match index % 3:
+            case 0:  # fewer beams
+                yield laser_scan(ranges[::2], start, 2 * step, stamp, range_max=maximum)
+            case 1:  # clockwise
+                end = float(scan.angles[-1])
+                yield laser_scan(ranges[::-1], end, -step, stamp, range_max=maximum)
+            case _:  # closer than it can measure is none
+                yield laser_scan(ranges, start, step, stamp, range_min=0.3, range_max=maximum)
+        yield (b"", as_message(scan)[:-7], laser_scan(ranges, start, 0.0))[index % 3]
+
+
+def test_scans_of_every_writing_are_mapped_and_noise_between_them_ends_nothing(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans = scans_of(logs[0])
+    with (
+        open_session([endpoint], patience=PATIENCE) as session,
+        laser(endpoint, native_key("/odd")) as sensor,
+        agent(endpoint, team, "ros2:/odd", "--rate", "max", "--scans", f":{len(scans)}") as process,
+    ):
+        listener = Listener(session, team)
+        sensor.wait_for_listener()
+        for message in as_odd_messages(scans):
+            sensor.say(message)
+        listener.until(lambda: listener.finished("a"))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+        assert process.stderr is not None
+        told = [line for line in process.stderr.read().splitlines() if "refused" in line]
+    assert len(listener.maps["a"].components) == 1
+    assert listener.statuses["a"].scans_placed == len(scans)
+    assert [line.partition(" ")[2].partition(":")[0] for line in told] == ["/odd"] * 2
