@@ -56,7 +56,8 @@ class JointStatusMessage(Message):
         Where each component of the latest version is: enough to say where a robot is in it.
     """
 
-    format: ClassVar[str] = "mapweave/coordinator-message/1"
+    kind: ClassVar[bytes] = b"c"
+    format: ClassVar[str] = "coordinator status"
 
     boot: Id
     stamp: Number

@@ -46,7 +46,8 @@ class StatusMessage(Message):
         By kind of message: ``map``, ``alignment``, ``pose``, ``status``.
     """
 
-    format: ClassVar[str] = "mapweave/status-message/1"
+    kind: ClassVar[bytes] = b"s"
+    format: ClassVar[str] = "status"
 
     robot: Id
     boot: Id
