@@ -9,7 +9,6 @@ import time
 import zlib
 from collections.abc import Iterator
 
-import msgpack
 import numpy as np
 import zenoh
 
@@ -17,7 +16,8 @@ from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire import keys
-from mapweave_protocol.wire.codec import MAX_PAYLOAD, encode
+from mapweave_protocol.wire.codec import DEFLATED, MAGIC, MAX_PAYLOAD, VERSION, encode
+from mapweave_protocol.wire.dictionary import DICTIONARY
 from mapweave_protocol.wire.messages import AlignmentMessage, MapMessage, MapVersion
 
 BOMBS = 100  # among each 10 000
@@ -79,9 +79,9 @@ def _of_another(team: str, chance: random.Random) -> Sent:
 def _bomb() -> bytes:
     """Return some 60 kB that stand for millions of empty maps."""
     row = b"\xdc\x0f\xff" + b"\x80" * 4095
-    body = zlib.compress(b"\xdc\x0f\xff" + row * 4095, 9)
-    packed: bytes = msgpack.packb({"format": MapMessage.format, "deflated": True, "body": body})
-    return packed
+    packer = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=DICTIONARY)
+    body = packer.compress(b"\xdc\x0f\xff" + row * 4095) + packer.flush()
+    return MAGIC + bytes([VERSION]) + MapMessage.kind + DEFLATED + body
 
 
 def main(endpoint: str, team: str, count: int, rate: float) -> None:

@@ -1,8 +1,9 @@
 """What arrives, from several subscriptions in one order, read and checked."""
 
 import threading
-from collections import OrderedDict, deque
-from collections.abc import Mapping
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -11,6 +12,7 @@ import zenoh
 from mapweave.errors import MapweaveError
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.refusals import Refusals
+from mapweave_protocol.link.turns import Turns
 from mapweave_protocol.wire.codec import MAX_PAYLOAD, decode
 from mapweave_protocol.wire.keys import (
     ALIGNMENT,
@@ -68,8 +70,8 @@ class Arrival:
 class Inbox:
     """A queue between Zenoh's threads and ours, in which no sender delays another.
 
-    Each sender has a queue of its own, and they take turns. When it is full, the oldest of the
-    sender that has most in it is dropped.
+    Each sender has a queue of its own; next is who has taken least time so far, counted from one
+    `get` to the next. When it is full, the oldest of the sender that has most in it is dropped.
 
     Parameters
     ----------
@@ -77,12 +79,22 @@ class Inbox:
         How many arrivals it holds.
     room
         How many bytes; one arrival always fits.
+    clock
+        Returns the time [s].
     """
 
-    def __init__(self, capacity: int = CAPACITY, room: int = ROOM) -> None:
+    def __init__(
+        self,
+        capacity: int = CAPACITY,
+        room: int = ROOM,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._capacity = capacity
         self._room = room
-        self._queues: OrderedDict[str, deque[Arrival]] = OrderedDict()
+        self._clock = clock
+        self._queues: dict[str, deque[Arrival]] = {}
+        self._turns = Turns()
+        self._served: tuple[str, float] | None = None  # whom, and when
         self._count = self._bytes = 0
         self._changed = threading.Condition()
         self.dropped = 0
@@ -98,7 +110,11 @@ class Inbox:
     def add(self, arrival: Arrival) -> None:
         """Take in `arrival`."""
         with self._changed:
-            self._queues.setdefault(sender_of(arrival.key), deque()).append(arrival)
+            sender = sender_of(arrival.key)
+            if sender not in self._queues:
+                self._queues[sender] = deque()
+                self._turns.joins(sender)
+            self._queues[sender].append(arrival)
             self._count += 1
             self._bytes += arrival.size
             while self._count > 1 and (self._count > self._capacity or self._bytes > self._room):
@@ -108,14 +124,16 @@ class Inbox:
     def get(self, timeout: float) -> Arrival | None:
         """Return the next arrival, None if there is none within `timeout` [s]."""
         with self._changed:
+            if self._served is not None:
+                sender, since = self._served
+                self._turns.took(sender, self._clock() - since)
+                self._served = None
             self._changed.wait_for(lambda: self._queues, timeout)
             if not self._queues:
                 return None
-            sender, queue = next(iter(self._queues.items()))
-            arrival = self._take(sender, queue)
-            if queue:
-                self._queues.move_to_end(sender)
-            return arrival
+            sender = self._turns.next_of(self._queues)
+            self._served = sender, self._clock()
+            return self._take(sender, self._queues[sender])
 
     def newest(self, timeout: float) -> Arrival | None:
         """As `get`, of several arrivals at the key that is next the last one only."""

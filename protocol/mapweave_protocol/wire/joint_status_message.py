@@ -62,7 +62,8 @@ class JointStatusMessage(Message):
         Whether versions are stored; not while the disk is full.
     """
 
-    format: ClassVar[str] = "mapweave/coordinator-message/1"
+    kind: ClassVar[bytes] = b"c"
+    format: ClassVar[str] = "coordinator status"
     budget: ClassVar[Budget] = Budget(4 * MIB, 8 * MIB, 150_000)
 
     boot: Id

@@ -52,7 +52,8 @@ class StatusMessage(Message):
         How many found no room.
     """
 
-    format: ClassVar[str] = "mapweave/status-message/1"
+    kind: ClassVar[bytes] = b"s"
+    format: ClassVar[str] = "status"
     budget: ClassVar[Budget] = Budget(256 * KIB, 2 * MIB, 30_000)
 
     robot: Id

@@ -23,7 +23,7 @@ def _taken(inbox: Inbox, count: int) -> list[tuple[str, int]]:
 
 
 def test_senders_take_turns_each_in_its_own_order() -> None:
-    inbox = Inbox()
+    inbox = Inbox(clock=lambda: 0.0)
     for number in range(100):
         inbox.add(_arrival("flood", number))
     for number in range(3):
@@ -60,7 +60,7 @@ def test_what_waits_is_bounded_in_bytes() -> None:
 
 @given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 3000)), max_size=60))
 def test_nothing_is_lost_or_doubled_while_there_is_room(sent: list[tuple[str, int]]) -> None:
-    inbox = Inbox()
+    inbox = Inbox(clock=lambda: 0.0)
     for robot, number in sent:
         inbox.add(_arrival(robot, number))
     taken = _taken(inbox, 100)
@@ -70,7 +70,7 @@ def test_nothing_is_lost_or_doubled_while_there_is_room(sent: list[tuple[str, in
 
 
 def test_of_several_at_a_key_the_newest_is_taken_and_others_stay() -> None:
-    inbox = Inbox()
+    inbox = Inbox(clock=lambda: 0.0)
     for number in range(5):
         inbox.add(_arrival("a", number))
         inbox.add(_arrival("b", number))
@@ -85,3 +85,39 @@ def test_who_sends_is_read_from_the_key_and_only_ids_are_names() -> None:
     assert keys.sender_of("mapweave/v2/t/joint/map") == keys.COORDINATOR
     for key in ("mapweave/v2/t/agent/R 1\n/map", "other/a/b", "", "mapweave/v2/t/agent"):
         assert keys.sender_of(key) == keys.UNKNOWN
+
+
+def test_who_costs_much_waits_while_others_are_served() -> None:
+    now = 0.0
+    inbox = Inbox(clock=lambda: now)
+    for number in range(100):
+        inbox.add(_arrival("costly", number))
+    for number in range(20):
+        inbox.add(_arrival("cheap", number))
+    served = []
+    for _ in range(22):
+        arrival = inbox.get(0.0)
+        assert arrival is not None
+        served.append(keys.sender_of(arrival.key))
+        now += 1.0 if served[-1] == "costly" else 0.01
+    assert served.count("cheap") == 20
+    assert served.count("costly") == 2
+
+
+def test_who_was_away_has_not_saved_up() -> None:
+    now = 0.0
+    inbox = Inbox(clock=lambda: now)
+    for number in range(200):
+        inbox.add(_arrival("a", number))
+    for _ in range(100):
+        inbox.get(0.0)
+        now += 0.1
+    for number in range(100):
+        inbox.add(_arrival("b", number))
+    served = []
+    for _ in range(40):
+        arrival = inbox.get(0.0)
+        assert arrival is not None
+        served.append(keys.sender_of(arrival.key))
+        now += 0.1
+    assert 15 <= served.count("b") <= 25

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 
 import msgpack
 
+from mapweave_protocol.wire.codec import DEFLATED, MAGIC, PLAIN, VERSION
+from mapweave_protocol.wire.dictionary import DICTIONARY
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
@@ -22,14 +24,16 @@ KINDS: tuple[type[Message], ...] = (
 
 def payload_of(kind: type[Message], body: bytes, *, deflated: bool = True) -> bytes:
     """Return what travels as a message of `kind`, its body whatever it is."""
-    packed: bytes = msgpack.packb(
-        {
-            "format": kind.format,
-            "deflated": deflated,
-            "body": zlib.compress(body, 9) if deflated else body,
-        }
-    )
-    return packed
+    return _head(kind, DEFLATED if deflated else PLAIN) + (_deflated(body) if deflated else body)
+
+
+def _head(kind: type[Message], packing: bytes) -> bytes:
+    return MAGIC + bytes([VERSION]) + kind.kind + packing
+
+
+def _deflated(body: bytes) -> bytes:
+    packer = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=DICTIONARY)
+    return packer.compress(body) + packer.flush()
 
 
 def _bodies() -> Iterator[bytes]:
@@ -48,10 +52,6 @@ def _bodies() -> Iterator[bytes]:
 def bombs() -> list[tuple[type[Message], bytes]]:
     """Return over a hundred of them, of all kinds, none larger than a megabyte."""
     bodies = [body for body in _bodies() if len(body) < 100 * 2**20]
-    deflated = [zlib.compress(body, 9) for body in bodies]
-    found = [
-        (kind, msgpack.packb({"format": kind.format, "deflated": True, "body": packed}))
-        for kind in KINDS
-        for packed in deflated
-    ]
+    deflated = [_deflated(body) for body in bodies]
+    found = [(kind, _head(kind, DEFLATED) + packed) for kind in KINDS for packed in deflated]
     return [(kind, payload) for kind, payload in found if len(payload) < 2**20]
