@@ -160,8 +160,12 @@ class Coordinator:
         return len({robot for robot, _ in self._maps} | robots) <= self._parameters.max_robots
 
     def has_maps_of(self, message: AlignmentMessage) -> bool:
-        """Tell whether the maps that `message` is about have been here."""
-        return all((self.version_of(e.robot, e.boot) or -1) >= e.version for e in _ends(message))
+        """Tell whether the maps that `message` is about are here, or soon may be."""
+        for end in _ends(message):
+            held = self.version_of(end.robot, end.boot)
+            if held is None or end.version > held + REMEMBERED_STATES:
+                return False
+        return True
 
     def doubt(self, robot: str, boot: str) -> None:
         """Take the next map of a run whatever its version: the one here is not the robot's."""

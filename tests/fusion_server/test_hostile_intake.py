@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from mapweave.maps import RobotMap
-from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
+from mapweave_fusion_server.coordinator import (
+    REMEMBERED_STATES,
+    Coordinator,
+    CoordinatorParameters,
+)
 from mapweave_fusion_server.early import MOST
 from mapweave_fusion_server.intake import FAR, Intake
 from mapweave_fusion_server.store import Store
@@ -135,7 +139,7 @@ def test_nobody_joins_two_others(
 def test_alignments_count_when_the_maps_that_they_are_about_are_here(
     hearing: Hearing, make_map: MakeMap, make_alignments: MakeAlignments
 ) -> None:
-    a, b = make_map("a"), make_map("b", 4)
+    a, b = make_map("a"), make_map("b", 4 + REMEMBERED_STATES)
     hearing.map(a)
     hearing.map(make_map("b", 3))
     hearing.alignments(make_alignments(a, b))

@@ -143,8 +143,8 @@ def test_hostile_messages_are_dropped_and_told_of(
     ):
         a.publish_map(make_map("a"))
         assert network.groups(watcher.next()) == [["a/0"]]
-    server.wait_for_log(f"{robot}/map: ignored")
-    server.wait_for_log(f"{robot}/alignment/m/a: ignored")
+    server.wait_for_log(f"{robot}/map: refused")
+    server.wait_for_log(f"{robot}/alignment/m/a: refused")
     assert server.stop() == 0
     assert "messages were not valid and dropped" in server.log
     assert "Traceback" not in server.log

@@ -64,12 +64,13 @@ def run(options: argparse.Namespace) -> int:
     link = link_of(options)
     encrypted = link.keys is not None
     endpoints: list[str] = options.listen or [ENCRYPTED_LISTEN if encrypted else DEFAULT_LISTEN]
+    config = router_config(endpoints, link, options.connect or ())
     if not encrypted and not options.insecure:
         _check_here(endpoints)
     if link.keys is not None and link.keys.member.role is not Role.ROUTER:
         raise FileError(link.keys.path, "keys of another member; expected those of the router")
     stopping = stop_on_signal()
-    with _open(endpoints, router_config(endpoints, link, options.connect or ())):
+    with _open(endpoints, config):
         print(f"router: listening at {', '.join(endpoints)}", file=sys.stderr)  # noqa: T201
         while not stopping():
             # In short naps: a signal that another thread takes does not wake this one.
