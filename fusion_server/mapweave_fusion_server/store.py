@@ -44,6 +44,23 @@ CREATE TABLE robot_map (
     message BLOB NOT NULL,
     PRIMARY KEY (robot, boot));
 """
+# What people and programs said; stores of before they could do not have these.
+_SAID = (
+    """CREATE TABLE IF NOT EXISTS mark (
+    robot TEXT NOT NULL,
+    boot TEXT NOT NULL,
+    received REAL NOT NULL,
+    message BLOB NOT NULL,
+    PRIMARY KEY (robot, boot))""",
+    """CREATE TABLE IF NOT EXISTS operator_order (
+    id TEXT PRIMARY KEY,
+    received REAL NOT NULL,
+    message BLOB NOT NULL)""",
+)
+_NEWS = " UNION ALL ".join(
+    f"SELECT received FROM {table}"
+    for table in ("alignment", "robot_map", "mark", "operator_order")
+)
 
 
 class Store:
@@ -157,12 +174,40 @@ class Store:
         """Return the last map of every run of every robot, also of those that are gone."""
         return self._blobs("SELECT message FROM robot_map ORDER BY robot, last_component")
 
+    def map_with_component(self, robot: str, component: int) -> bytes | None:
+        """Return the map of the run that the component of that number is, or was, of.
+
+        A run numbers its components above those of the runs before it.
+        """
+        return self._blob(
+            "SELECT message FROM robot_map WHERE robot = ? AND last_component >= ?"
+            " ORDER BY last_component LIMIT 1",
+            robot, component,
+        )  # fmt: skip
+
+    def keep_marks(self, run: tuple[str, str], received: float, message: bytes) -> None:
+        """Keep the marks of a run, a robot and a boot, in place of those kept before."""
+        self._rows("INSERT OR REPLACE INTO mark VALUES (?, ?, ?, ?)", *run, received, message)
+
+    def last_marks(self) -> list[bytes]:
+        """Return the marks of every run of every robot that made some."""
+        return self._blobs("SELECT message FROM mark ORDER BY robot, boot")
+
+    def add_order(self, identity: str, received: float, message: bytes) -> None:
+        """Keep an operator's order, once."""
+        self._rows(
+            "INSERT OR IGNORE INTO operator_order VALUES (?, ?, ?)", identity, received, message
+        )
+
+    def orders(self) -> list[bytes]:
+        """Return all orders of operators, in the order in which they came."""
+        return self._blobs("SELECT message FROM operator_order ORDER BY received, id")
+
     @property
     def holds_news(self) -> bool:
         """Whether something was received after what the last version was made of."""
         [(received, created)] = self._rows(
-            "SELECT (SELECT max(received) FROM (SELECT received FROM alignment"
-            " UNION ALL SELECT received FROM robot_map)), (SELECT max(created) FROM version)"
+            f"SELECT (SELECT max(received) FROM ({_NEWS})), (SELECT max(created) FROM version)"
         )
         return received is not None and (created is None or received > created)
 
@@ -176,6 +221,8 @@ class Store:
         [(owner, self.series)] = self._rows("SELECT team, series FROM owner")
         if owner != team:
             raise FileError(self.path, f"the store of team {owner!r}, expected team {team!r}")
+        for table in _SAID:
+            self._rows(table)
         self._rows("PRAGMA journal_mode = WAL")
         self._rows("PRAGMA synchronous = NORMAL")  # in WAL mode a crash still loses no consistency
 

@@ -20,6 +20,8 @@ from mapweave_protocol.wire.model import (
     WireModel,
     to_transform,
 )
+from mapweave_protocol.wire.orders.marks_message import WirePlacedMark
+from mapweave_protocol.wire.orders.order_message import MAX_ORDERS, WireOrder
 
 
 class WireComponent(WireModel):
@@ -29,6 +31,7 @@ class WireComponent(WireModel):
     confidence: Probability
     lines: PackedLines
     segment_confidence: bytes = Field(max_length=MAX_BYTES)
+    marks: tuple[WirePlacedMark, ...] = Field(default=(), max_length=MAX_ALIGNMENTS)
 
     @classmethod
     def pack(cls, component: JointComponent) -> Self:
@@ -42,6 +45,7 @@ class WireComponent(WireModel):
             confidence=float(component.confidence),
             lines=lines,
             segment_confidence=packing.pack_integers(confidence[:, None]),
+            marks=tuple(WirePlacedMark.pack(mark) for mark in component.marks),
         )
 
     @model_validator(mode="after")
@@ -66,6 +70,7 @@ class WireComponent(WireModel):
             confidence=self.confidence,
             map=lines,
             segment_confidence=packing.unquantise(permille, 1e3, 1.0),
+            marks=tuple(mark.unpack() for mark in self.marks),
         )
 
 
@@ -86,6 +91,7 @@ class JointMapMessage(Message):
     version: int = Field(ge=1, le=2**53)
     components: tuple[WireComponent, ...] = Field(max_length=MAX_ALIGNMENTS)
     alignments: tuple[WireAlignment, ...] = Field(max_length=MAX_ALIGNMENTS)
+    orders: tuple[WireOrder, ...] = Field(default=(), max_length=MAX_ORDERS)
 
     @classmethod
     def pack(cls, joint: JointMap, series: str) -> Self:
@@ -95,6 +101,7 @@ class JointMapMessage(Message):
             version=joint.version,
             components=tuple(WireComponent.pack(component) for component in joint.components),
             alignments=tuple(WireAlignment.pack(alignment) for alignment in joint.alignments),
+            orders=tuple(WireOrder.pack(order) for order in joint.orders),
         )
 
     def unpack(self) -> JointMap:
@@ -103,4 +110,5 @@ class JointMapMessage(Message):
             self.version,
             tuple(component.unpack() for component in self.components),
             tuple(alignment.unpack() for alignment in self.alignments),
+            orders=tuple(order.unpack() for order in self.orders),
         )
