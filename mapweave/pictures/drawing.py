@@ -14,7 +14,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
-from matplotlib.patheffects import withStroke
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
@@ -179,7 +178,7 @@ def _draw_marks(axes: Axes, placed: PlacedScene) -> None:
             zorder=7,
             gid=f"mark-{mark.id}",
         )
-        label = axes.annotate(
+        axes.annotate(
             mark.label,
             (x, y),
             xytext=(5.0, 3.0),
@@ -187,7 +186,7 @@ def _draw_marks(axes: Axes, placed: PlacedScene) -> None:
             fontsize=MARK_FONT,
             fontweight="bold",
             color=MARK,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},
             parse_math=False,
             zorder=7,
         )
-        label.set_path_effects([withStroke(linewidth=2.0, foreground="white")])

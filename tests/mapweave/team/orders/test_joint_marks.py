@@ -55,7 +55,7 @@ def test_a_mark_stays_with_its_scan_where_the_submap_is_cut_and_numbers_move_on(
     with_mark = marked(robot_map(np.random.default_rng(5)), 0, PLACE)
     [mark] = with_mark.marks
     assert mark.anchor.scan is not None
-    cut = []
+    cut: list[Submap] = []
     for submap in with_mark.submaps:
         path = submap.trajectory
         before = path.scan_index < mark.anchor.scan

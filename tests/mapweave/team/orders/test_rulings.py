@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from mapweave.geometry import se2
 from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap, Trajectory
@@ -40,13 +41,20 @@ def found(pair: str, *, sure: float = 0.9, off: Sequence[float] | None = None) -
 
 
 def order(
-    kind: OrderKind, pair: str, transform: Sequence[float] | None = None, *, time: float = 1.0
+    kind: OrderKind, pair: str, transform: ArrayLike | None = None, *, time: float = 1.0
 ) -> Order:
     """Return an order of anna's about a pair such as ``ab``."""
-    about = {"reference": f"{pair[0]}/0", "other": f"{pair[1]}/0"}
     given = None if transform is None else np.array(transform)
-    identity = f"{kind}-{pair}-{time:g}"
-    return Order(identity, kind, "anna", time, "so it is", **about, transform=given)
+    return Order(
+        f"{kind}-{pair}-{time:g}",
+        kind,
+        "anna",
+        time,
+        "so it is",
+        reference=f"{pair[0]}/0",
+        other=f"{pair[1]}/0",
+        transform=given,
+    )
 
 
 def true_pin(pair: str, *, time: float = 1.0) -> Order:
