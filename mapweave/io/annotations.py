@@ -4,14 +4,24 @@ from collections.abc import Iterable
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
-from pydantic import Field, StringConstraints
+from pydantic import AfterValidator, Field, StringConstraints
 
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.file_types import ComponentName, Count, FileModel, Metre, Pose, RobotId
 from mapweave.marks import MAX_LABEL, Anchor, Mark, PlacedMark
 from mapweave.orders import Order, OrderEffect, OrderKind
 
-_Label: TypeAlias = Annotated[str, StringConstraints(min_length=1, max_length=MAX_LABEL)]
+
+def _printable(text: str) -> str:
+    """Refuse what would move the cursor of a terminal that shows it."""
+    if not text.isprintable():
+        raise ValueError("expected printable text")
+    return text
+
+
+_Label: TypeAlias = Annotated[
+    str, StringConstraints(min_length=1, max_length=MAX_LABEL), AfterValidator(_printable)
+]
 _METRES, _RADIANS, _SECONDS = 4, 6, 3  # decimals
 
 

@@ -13,6 +13,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Submap
 from mapweave.marks import MAX_LABEL, Anchor, Mark
 from mapweave_protocol.wire.messages import MapVersion, MarksMessage
+from mapweave_protocol.wire.model import WORLD_REACH
 from mapweave_protocol.wire.orders.marks_message import MAX_MARKS
 from mapweave_protocol.wire.orders.order_message import new_order_id
 
@@ -123,6 +124,12 @@ def checked(label: str, x: float, y: float, frame: str) -> FloatArray:
         raise ArgumentError("label", f"expected 1 to {MAX_LABEL} printable characters")
     if frame not in ("map", "sensor"):
         raise ArgumentError("frame", f"expected 'map' or 'sensor', got {frame!r}")
-    return np.array(
-        [as_number(name, value, "a number [m]") for name, value in (("x", x), ("y", y))]
-    )
+    return np.array([_coordinate("x", x), _coordinate("y", y)])
+
+
+def _coordinate(name: str, value: float) -> float:
+    expected = f"expected a number of at most {WORLD_REACH:g} [m]"
+    number = as_number(name, value, expected)
+    if abs(number) > WORLD_REACH:
+        raise ArgumentError(name, f"{expected}, got {value!r}")
+    return number

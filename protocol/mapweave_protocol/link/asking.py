@@ -21,6 +21,7 @@ from mapweave_protocol.wire.orders.runs_message import WireRun
 from mapweave_protocol.wire.queries import JointQuery
 
 ANSWER_WITHIN = 5.0  # [s]
+ALL_ORDERS = JointQuery(orders="all").parameters
 
 M = TypeVar("M", bound=Message)
 
@@ -124,14 +125,14 @@ def request_orders_of(
     on_sample
         Called in a thread of Zenoh's.
     """
-    _request(session, AGENT_QUERY.build(team=team, robot=robot), "orders=all", on_sample)
+    _request(session, f"{AGENT_QUERY.build(team=team, robot=robot)}?{ALL_ORDERS}", on_sample)
 
 
 def request_orders_of_coordinator(
     session: zenoh.Session, team: str, on_sample: Callable[[zenoh.Sample], None]
 ) -> None:
     """Ask the coordinator for the orders that it holds; else as `request_orders_of`."""
-    _request(session, JOINT_QUERY.build(team=team), "orders=all", on_sample)
+    _request(session, f"{JOINT_QUERY.build(team=team)}?{ALL_ORDERS}", on_sample)
 
 
 def request_all_of(
@@ -144,21 +145,26 @@ def request_all_of(
     on_sample
         Called in a thread of Zenoh's.
     """
-    _request(session, AGENT_QUERY.build(team=team, robot=robot), "", on_sample)
+    # Zenoh says so by a parameter of its own, `_anyke`: not where we have some.
+    under_any = zenoh.ReplyKeyExpr.ANY
+    _request(session, AGENT_QUERY.build(team=team, robot=robot), on_sample, under_any)
 
 
 def _request(
-    session: zenoh.Session, key: str, parameters: str, on_sample: Callable[[zenoh.Sample], None]
+    session: zenoh.Session,
+    selector: str,
+    on_sample: Callable[[zenoh.Sample], None],
+    accepted: zenoh.ReplyKeyExpr = zenoh.ReplyKeyExpr.MATCHING_QUERY,
 ) -> None:
     def take(reply: zenoh.Reply) -> None:
         if reply.ok:
             on_sample(reply.ok)
 
     session.get(
-        f"{key}?{parameters}" if parameters else key,
+        selector,
         take,
         consolidation=zenoh.ConsolidationMode.NONE,
-        accept_replies=zenoh.ReplyKeyExpr.ANY,
+        accept_replies=accepted,
         timeout=ANSWER_WITHIN,
     )
 

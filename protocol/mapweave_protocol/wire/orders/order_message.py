@@ -113,8 +113,8 @@ class OrderMessage(Message):
             raise ValueError(f"{self.kind}: expected {_ENDS[self.kind]} ends")
         if (self.label is not None) != (self.kind is OrderKind.MARK):
             raise ValueError(f"{self.kind}: expected a label of a mark, and of nothing else")
-        forgets = self.robot is not None and len(self.boots) > 0
-        if forgets != (self.kind is OrderKind.FORGET) or (self.robot is None and self.boots):
+        told = {self.robot is not None, len(self.boots) > 0}
+        if told != {self.kind is OrderKind.FORGET}:
             raise ValueError(f"{self.kind}: expected a robot and its runs to be forgotten only")
         self._check_transform()
         return self
