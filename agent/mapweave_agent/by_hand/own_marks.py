@@ -101,15 +101,14 @@ class OwnMarks:
 
 def _held(submaps: Sequence[Submap], place: FloatArray, frame: Frame) -> tuple[Anchor, FloatArray]:
     """Return what holds a mark at `place`, and where it is from there."""
-    if not submaps:
+    driven = [submap for submap in submaps if len(submap.trajectory.scan_index)]
+    last = max(driven, key=lambda s: int(s.trajectory.scan_index[-1]), default=None)
+    if last is None:
         raise ArgumentError("mark", "nothing is mapped yet; expected a scan that was placed")
-    last = submaps[-1]
+    here = Anchor(last.id, int(last.trajectory.scan_index[-1])), place
     if frame == "sensor":
-        return Anchor(last.id, int(last.trajectory.scan_index[-1])), place
-    found = anchored(submaps, last.component, place)
-    if found is None:
-        raise ArgumentError("mark", "nothing is mapped yet; expected a scan that was placed")
-    return found
+        return here
+    return anchored(submaps, last.component, place) or here
 
 
 def checked(label: str, x: float, y: float, frame: str) -> FloatArray:

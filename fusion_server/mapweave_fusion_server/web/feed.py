@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 from mapweave.maps import RobotMap
+from mapweave_fusion_server.web.positions import Positions
 from mapweave_protocol.wire.messages import OrderMessage, StatusMessage
 
 
@@ -85,9 +86,15 @@ class Feed:
 
     A listener is called in the thread of the coordinator, and must return at once. Orders go the
     other way: they wait until the coordinator takes them.
+
+    Attributes
+    ----------
+    positions
+        Where the robots are now: these come past the coordinator, at the rate of scans.
     """
 
     def __init__(self) -> None:
+        self.positions = Positions()
         self._lock = threading.Lock()
         self._orders: deque[OrderMessage] = deque()
         self._seen = Seen()
