@@ -3,6 +3,7 @@
 import logging
 import time
 
+from mapweave_agent.by_hand.kept_orders import KeptOrders
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -42,6 +43,8 @@ class Dispatcher:
         Told what others hold.
     whereabouts
         Told which frames the joint map has.
+    orders
+        Told what operators order.
     """
 
     def __init__(
@@ -51,11 +54,13 @@ class Dispatcher:
         plan: ComparisonSchedule,
         needs: Needs,
         whereabouts: Whereabouts,
+        orders: KeptOrders,
     ) -> None:
         self._robot = robot
         self._plan = plan
         self._needs = needs
         self._whereabouts = whereabouts
+        self._orders = orders
         self.refusals = Refusals()
         self._maps = map_reader(self.refusals)
         self._statuses = status_reader(self.refusals)
@@ -71,7 +76,7 @@ class Dispatcher:
     @property
     def refused(self) -> int:
         """How many messages were not what they should be."""
-        return self.refusals.total
+        return self.refusals.total + self._orders.refused
 
     def take(self, arrival: Arrival) -> None:
         """Take in what arrived."""
@@ -89,6 +94,8 @@ class Dispatcher:
             self._take_alignment(arrival)
         elif self._joint_statuses.reads(arrival):
             self._take_joint_status(arrival)
+        else:
+            self._orders.takes(arrival)
 
     def _take_presence(self, presence: Presence) -> None:
         if presence.robot == self._robot:
@@ -112,6 +119,7 @@ class Dispatcher:
         if status is not None:
             self._needs.coordinator(status)
             self._whereabouts.coordinator(status)
+            self._orders.coordinator(status)
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)

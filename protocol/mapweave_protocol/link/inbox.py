@@ -15,12 +15,16 @@ from mapweave_protocol.link.refusals import Refusals
 from mapweave_protocol.link.turns import Turns
 from mapweave_protocol.wire.codec import MAX_PAYLOAD, decode
 from mapweave_protocol.wire.keys import (
+    AGENT_QUERY,
     ALIGNMENT,
     COORDINATOR_LIVE,
     JOINT_MAP,
+    JOINT_QUERY,
     JOINT_STATUS,
     LIVE,
     MAP,
+    MARK,
+    ORDER,
     POSE,
     STATUS,
     KeyFormat,
@@ -31,6 +35,9 @@ from mapweave_protocol.wire.messages import (
     JointMapMessage,
     JointStatusMessage,
     MapMessage,
+    MarksMessage,
+    OrderMessage,
+    OrdersMessage,
     PoseMessage,
     StatusMessage,
 )
@@ -258,9 +265,12 @@ def check_origin(message: Message, parts: Mapping[str, str]) -> None:
     Raises
     ------
     MessageError
-        If a robot's id differs, or somebody speaks of two others.
+        If the id of a robot or an operator differs, what kind of order it is, or if somebody
+        speaks of two others.
     """
     said = message.model_dump(include={"robot"})
+    if isinstance(message, OrderMessage):
+        said = {"name": message.by, "order": str(message.kind)}
     if isinstance(message, AlignmentMessage):
         pair = {"reference": message.reference.robot, "other": message.other.robot}
         if message.robot not in pair.values():
@@ -276,6 +286,26 @@ def check_origin(message: Message, parts: Mapping[str, str]) -> None:
 def map_reader(refusals: Refusals | None = None) -> Reader[MapMessage]:
     """Return a reader of robot maps."""
     return Reader(MapMessage, MAP, refusals)
+
+
+def marks_reader(refusals: Refusals | None = None) -> Reader[MarksMessage]:
+    """Return a reader of the marks of robots."""
+    return Reader(MarksMessage, MARK, refusals)
+
+
+def order_reader(refusals: Refusals | None = None) -> Reader[OrderMessage]:
+    """Return a reader of operators' orders."""
+    return Reader(OrderMessage, ORDER, refusals)
+
+
+def held_orders_reader(refusals: Refusals | None = None) -> Reader[OrdersMessage]:
+    """Return a reader of what agents answer that were asked for all orders they hold."""
+    return Reader(OrdersMessage, AGENT_QUERY, refusals)
+
+
+def coordinators_orders_reader(refusals: Refusals | None = None) -> Reader[OrdersMessage]:
+    """Return a reader of what the coordinator answers that was asked for them."""
+    return Reader(OrdersMessage, JOINT_QUERY, refusals)
 
 
 def pose_reader(refusals: Refusals | None = None) -> Reader[PoseMessage]:

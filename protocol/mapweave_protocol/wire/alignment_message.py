@@ -172,7 +172,7 @@ class AlignmentMessage(Message):
         One for each pair of components, its `reference` of the robot `reference`.
     """
 
-    kind: ClassVar[bytes] = b"a"
+    letter: ClassVar[bytes] = b"a"
     format: ClassVar[str] = "alignment"
     budget: ClassVar[Budget] = Budget(4 * MIB, 8 * MIB, 300_000)
 

@@ -44,7 +44,7 @@ def encode(message: Message) -> bytes:
     budget = message.budget
     # What comes to too much of too few bytes, receivers refuse.
     smaller = len(deflated) < len(body) <= budget.body_of(len(deflated))
-    head = MAGIC + bytes([VERSION]) + message.kind + (DEFLATED if smaller else PLAIN)
+    head = MAGIC + bytes([VERSION]) + message.letter + (DEFLATED if smaller else PLAIN)
     payload = head + (deflated if smaller else body)
     if len(payload) > budget.payload or len(body) > budget.body:
         problem = f"{len(payload)} bytes, expected at most {budget.payload}"
@@ -90,9 +90,9 @@ def _check_head(kind: type[Message], payload: bytes) -> None:
         raise MessageError(kind.format, f"expected it to begin with {MAGIC.decode()}")
     if payload[2] != VERSION:
         raise MessageError(kind.format, f"version {payload[2]} of the wire, expected {VERSION}")
-    if payload[3:4] != kind.kind:
+    if payload[3:4] != kind.letter:
         raise MessageError(
-            kind.format, f"found kind {payload[3:4]!r}, expected {kind.kind.decode()!r}"
+            kind.format, f"found kind {payload[3:4]!r}, expected {kind.letter.decode()!r}"
         )
 
 

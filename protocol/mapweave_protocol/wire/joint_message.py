@@ -23,6 +23,8 @@ from mapweave_protocol.wire.model import (
     WireModel,
     to_transform,
 )
+from mapweave_protocol.wire.orders.marks_message import WirePlacedMark
+from mapweave_protocol.wire.orders.order_message import MAX_ORDERS, WireOrder
 
 
 class WireComponent(WireModel):
@@ -31,6 +33,7 @@ class WireComponent(WireModel):
     robots: dict[ComponentName, JointTransform] = Field(min_length=1, max_length=MAX_ALIGNMENTS)
     confidence: Probability
     stream: bytes = Field(max_length=MAX_BYTES)
+    marks: tuple[WirePlacedMark, ...] = Field(default=(), max_length=MAX_ALIGNMENTS)
 
     @classmethod
     def pack(cls, component: JointComponent) -> Self:
@@ -42,6 +45,7 @@ class WireComponent(WireModel):
             robots={name: to_transform(pose) for name, pose in component.robots.items()},
             confidence=round(float(component.confidence), 4),
             stream=encoder.finish(),
+            marks=tuple(WirePlacedMark.pack(mark) for mark in component.marks),
         )
 
     @model_validator(mode="after")
@@ -69,6 +73,7 @@ class WireComponent(WireModel):
             confidence=self.confidence,
             map=self._lines.unpack(JOINT_REACH),
             segment_confidence=certainties / CERTAINTIES,
+            marks=tuple(mark.unpack() for mark in self.marks),
         )
 
 
@@ -83,7 +88,7 @@ class JointMapMessage(Message):
         1, 2, 3…
     """
 
-    kind: ClassVar[bytes] = b"j"
+    letter: ClassVar[bytes] = b"j"
     format: ClassVar[str] = "joint map"
     budget: ClassVar[Budget] = Budget(16 * MIB, 32 * MIB, 300_000)
 
@@ -91,6 +96,7 @@ class JointMapMessage(Message):
     version: int = Field(ge=1, le=2**53)
     components: tuple[WireComponent, ...] = Field(max_length=MAX_ALIGNMENTS)
     alignments: tuple[WireAlignment, ...] = Field(max_length=MAX_ALIGNMENTS)
+    orders: tuple[WireOrder, ...] = Field(default=(), max_length=MAX_ORDERS)
 
     @classmethod
     def pack(cls, joint: JointMap, series: str) -> Self:
@@ -100,6 +106,7 @@ class JointMapMessage(Message):
             version=joint.version,
             components=tuple(WireComponent.pack(component) for component in joint.components),
             alignments=tuple(WireAlignment.pack(alignment) for alignment in joint.alignments),
+            orders=tuple(WireOrder.pack(order) for order in joint.orders),
         )
 
     def unpack(self) -> JointMap:
@@ -108,4 +115,5 @@ class JointMapMessage(Message):
             self.version,
             tuple(component.unpack() for component in self.components),
             tuple(alignment.unpack() for alignment in self.alignments),
+            orders=tuple(order.unpack() for order in self.orders),
         )

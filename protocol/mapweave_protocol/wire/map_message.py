@@ -124,7 +124,7 @@ class MapMessage(Message):
         The `Changes`.
     """
 
-    kind: ClassVar[bytes] = b"m"
+    letter: ClassVar[bytes] = b"m"
     format: ClassVar[str] = "map"
     budget: ClassVar[Budget] = Budget(16 * MIB, 32 * MIB, 50_000)
 

@@ -69,9 +69,9 @@ class WireModel(BaseModel):
 
 
 class Message(WireModel):
-    """A message; `kind` tells on the wire which, `format` in words; `budget` bounds it."""
+    """A message; `letter` tells on the wire which, `format` in words; `budget` bounds it."""
 
-    kind: ClassVar[bytes]
+    letter: ClassVar[bytes]
     format: ClassVar[str]
     budget: ClassVar[Budget]
 

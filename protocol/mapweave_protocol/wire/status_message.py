@@ -7,6 +7,7 @@ from pydantic import Field
 from mapweave_protocol.wire.alignment_message import MapVersion
 from mapweave_protocol.wire.budget import KIB, MIB, Budget
 from mapweave_protocol.wire.model import Count, Id, Label, Message, Number, WireModel
+from mapweave_protocol.wire.orders.order_message import DIGEST_SIZE
 
 MAX_PEERS = 1024
 MAX_REFUSED = 64  # kinds of several senders
@@ -45,14 +46,16 @@ class StatusMessage(Message):
     holds
         Which state of each peer's map is held.
     sent
-        By kind of message: ``map``, ``alignment``, ``pose``, ``status``.
+        By kind of message: ``map``, ``alignment``, ``pose``, ``mark``, ``status``.
+    orders
+        Tells apart which orders of operators are held; nothing where none are.
     refused
         How many messages were refused, by who sent them and what they were, such as ``r2 map``.
     dropped
         How many found no room.
     """
 
-    kind: ClassVar[bytes] = b"s"
+    letter: ClassVar[bytes] = b"s"
     format: ClassVar[str] = "status"
     budget: ClassVar[Budget] = Budget(256 * KIB, 2 * MIB, 30_000)
 
@@ -71,5 +74,6 @@ class StatusMessage(Message):
     compared: dict[Id, Compared] = Field(default_factory=dict, max_length=MAX_PEERS)
     holds: tuple[MapVersion, ...] = Field(default=(), max_length=MAX_PEERS)
     sent: dict[Label, Traffic] = Field(default_factory=dict, max_length=16)
+    orders: bytes = Field(default=b"", max_length=DIGEST_SIZE)
     refused: dict[Label, Count] = Field(default_factory=dict, max_length=MAX_REFUSED)
     dropped: Count = 0

@@ -20,7 +20,7 @@ from mapweave_protocol.link.session import open_session
 
 MAPWEAVE = Path(sys.executable).with_name("mapweave")
 PATIENCE = 30.0  # [s] for what takes a fraction of a second on a quiet machine
-ROSTER = Roster("rescue", ("r1", "r2"), ("ann",), ("bob",))
+ROSTER = Roster("rescue", ("r1", "r2"), ("ann", "eve"), ("bob",))
 
 Connect: TypeAlias = Callable[..., zenoh.Session]
 

@@ -57,7 +57,8 @@ def test_each_member_writes_what_is_its_own_and_everybody_reads_it(connect: Conn
     for session, key in (
         (connect(Role.ROBOT, "r1"), MAP_1),
         (connect(Role.ROBOT, "r2"), keys.STATUS.build(team=TEAM, robot="r2")),
-        (connect(Role.OPERATOR, "ann"), f"mapweave/{MAP_1.split('/')[1]}/{TEAM}/operator/ann/pin"),
+        (connect(Role.OPERATOR, "ann"), keys.ORDER.build(team=TEAM, name="ann", order="pin")),
+        (connect(Role.OPERATOR, "eve"), MAP_2),
         (coordinator, JOINT),
     ):
         _put_until_heard(session, inbox, key)
@@ -97,7 +98,8 @@ FORGED = [
     (Role.ROBOT, "r1", keys.MAP.pattern(team=TEAM)),
     (Role.VIEWER, "bob", MAP_1),
     (Role.VIEWER, "bob", JOINT),
-    (Role.OPERATOR, "ann", MAP_1),
+    (Role.OPERATOR, "ann", keys.POSE.build(team=TEAM, robot="r2")),
+    (Role.OPERATOR, "ann", MAP_1.replace("/agent/r1/map", "/operator/eve/pin")),
     (Role.OPERATOR, "ann", JOINT),
 ]
 

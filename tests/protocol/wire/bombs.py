@@ -12,13 +12,18 @@ from mapweave_protocol.wire.messages import (
     JointMapMessage,
     JointStatusMessage,
     MapMessage,
+    MarksMessage,
+    OrderMessage,
+    OrdersMessage,
     PoseMessage,
+    RunsMessage,
     StatusMessage,
 )
 from mapweave_protocol.wire.model import Message
 
 KINDS: tuple[type[Message], ...] = (
     MapMessage, AlignmentMessage, JointMapMessage, JointStatusMessage, StatusMessage, PoseMessage,
+    MarksMessage, OrderMessage, OrdersMessage, RunsMessage,
 )  # fmt: skip
 
 
@@ -28,7 +33,7 @@ def payload_of(kind: type[Message], body: bytes, *, deflated: bool = True) -> by
 
 
 def _head(kind: type[Message], packing: bytes) -> bytes:
-    return MAGIC + bytes([VERSION]) + kind.kind + packing
+    return MAGIC + bytes([VERSION]) + kind.letter + packing
 
 
 def _deflated(body: bytes) -> bytes:

@@ -64,8 +64,10 @@ def own_keys(member: Member) -> tuple[str, ...]:
             return f"{root}/agent/{name}/**", f"{root}/live/agent/{name}/*"
         case Role.COORDINATOR:  # it passes on the orders that are given on its page
             return f"{root}/joint/**", f"{root}/live/coordinator/*", f"{root}/operator/**"
-        case Role.OPERATOR:
-            return (f"{root}/operator/{name}/**",)
+        case Role.OPERATOR:  # may deliver a map for a robot, and plays its part meanwhile
+            robots = (f"{root}/agent/*/{kind}" for kind in ("map", "mark", "status"))
+            found = f"{root}/agent/*/alignment/*/*"
+            return f"{root}/operator/{name}/**", *robots, found, f"{root}/live/agent/*/*"
     return ()
 
 
