@@ -24,8 +24,11 @@ from mapweave_protocol.wire.messages import (
     MarksMessage,
     OrderMessage,
 )
+from mapweave_protocol.wire.model import MAX_ALIGNMENTS
 from mapweave_protocol.wire.pairs import Run, is_older, states_of
+from mapweave_protocol.wire.status_message import MAX_PEERS
 
+MAX_CHANGES = 1_000_000  # of the marks of a run
 MAX_RUNS = 64  # of a robot: a new battery every hour for a week of days
 REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
 
@@ -208,7 +211,8 @@ class Coordinator:
             self._replace_doubted(new)
         elif known is not None and known.version >= new.version:
             return False
-        if known is None and len(self._runs_of(new.robot)) >= MAX_RUNS:
+        runs = len(self._runs_of(new.robot))
+        if known is None and (runs >= MAX_RUNS or len(self._maps) >= MAX_PEERS):
             return False
         self._maps[_run(new)] = new
         self._remember_state(new)
@@ -224,6 +228,8 @@ class Coordinator:
             return False
         runs = frozenset(states_of(_ends(new)))
         known = self._alignments.get(runs)
+        if known is None and len(self._alignments) >= MAX_ALIGNMENTS:
+            return False
         if known is not None and is_older(_ends(new), _ends(known)):
             return False
         self._alignments[runs] = new
@@ -243,8 +249,13 @@ class Coordinator:
                 del self._alignments[runs]
 
     def receive_marks(self, new: MarksMessage) -> bool:
-        """Take the marks that a run of a robot made; return whether they are news."""
-        if not self.admits({new.robot}) or not self._said.take_marks(new):
+        """Take the marks that a run of a robot made; return whether they are news.
+
+        They are once its map is here, on which they are.
+        """
+        if (new.robot, new.boot) not in self._maps or new.version > MAX_CHANGES:
+            return False
+        if not self._said.take_marks(new):
             return False
         self._raise_urgency(Urgency.NOW)
         return True

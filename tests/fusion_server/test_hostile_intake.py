@@ -10,6 +10,7 @@ import pytest
 
 from mapweave.maps import RobotMap
 from mapweave_fusion_server.coordinator import (
+    MAX_RUNS,
     REMEMBERED_STATES,
     Coordinator,
     CoordinatorParameters,
@@ -24,7 +25,13 @@ from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.messages import AlignmentMessage, MapMessage, StatusMessage
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    MapMessage,
+    MarksMessage,
+    StatusMessage,
+)
+from mapweave_protocol.wire.status_message import MAX_PEERS
 
 if TYPE_CHECKING:
     from tests.fusion_server.conftest import MakeAlignments, MakeMap
@@ -35,10 +42,10 @@ LIMIT = 3  # robots
 class Hearing:
     """An intake on a store of its own."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, robots: int = LIMIT) -> None:
         self.store = store
         self.story = Story()
-        self.coordinator = Coordinator(CoordinatorParameters(max_robots=LIMIT))
+        self.coordinator = Coordinator(CoordinatorParameters(max_robots=robots))
         self.intake = Intake(self.coordinator, store, self.story)
 
     def map(self, robot_map: RobotMap) -> None:
@@ -51,6 +58,11 @@ class Hearing:
         parts = {"reference": message.reference.robot, "other": message.other.robot}
         key = keys.ALIGNMENT.build(team="t", robot=message.robot, **parts)
         self.intake.take(Arrival(key, encode(message)), 0.0)
+
+    def marks(self, robot: str, boot: str) -> None:
+        """Let a run say that it made no mark."""
+        key = keys.MARK.build(team="t", robot=robot)
+        self.intake.take(Arrival(key, encode(MarksMessage.pack(robot, boot, 1, []))), 0.0)
 
     def presence(self, robot: str, boot: str, *, gone: bool = False) -> None:
         """Let a token come or go."""
@@ -190,3 +202,18 @@ def test_robots_beyond_the_limit_are_refused_and_counted(
         hearing.map(make_map(robot))
     assert len(hearing.coordinator.maps) == LIMIT
     assert hearing.intake.refusals.counts == {("d", MapMessage.format): 1}
+
+
+def test_what_the_status_says_stays_within_what_it_may_say(
+    tmp_path: Path, make_map: MakeMap
+) -> None:
+    with Store(tmp_path / "store.sqlite", "t") as store:
+        hearing = Hearing(store, robots=64)
+        for robot in range(20):
+            for run in range(MAX_RUNS):
+                boot = f"b{run}"
+                hearing.map(make_map(f"r{robot}", boot=boot, first=run))
+                hearing.marks(f"r{robot}", boot)
+                hearing.marks(f"r{robot}", f"invented{run}")
+        assert len(hearing.coordinator.maps_held) == MAX_PEERS
+        assert len(hearing.coordinator.marks_held) == MAX_PEERS
