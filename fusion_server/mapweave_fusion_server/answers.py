@@ -55,7 +55,7 @@ def runs_of(payloads: Iterable[bytes]) -> RunsMessage:
             robot=message.robot,
             boot=message.boot,
             version=message.version,
-            components=tuple(sorted({place.component for place in message.places})),
+            components=tuple(sorted({place.component for place in message.changes.places})),
         )
         for message in maps
     )
