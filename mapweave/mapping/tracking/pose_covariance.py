@@ -4,16 +4,20 @@ Along a corridor's walls nothing holds a scan; across them they do. The error th
 of a scan against what was mapped lately, not what adds up over a path.
 """
 
+import math
+
 import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.ellipses import ellipse
 from mapweave.parameters import StageParameters, derived
 
 EXACT: FloatArray = np.zeros(4)
 """Of a pose that was given and not found, as that of the scan that defines the frame."""
 EXACT.setflags(write=False)
+_DIAGONAL = np.diag_indices(3)
 
 
 class PoseCovarianceParameters(StageParameters):
@@ -55,13 +59,13 @@ def pose_uncertainty(
     if not information.any():
         return EXACT
     p = parameters or PoseCovarianceParameters()
-    unheld = np.diag([p.step, p.step, p.turn]) ** 2
-    covariance = np.linalg.inv(information / p.noise**2 + np.linalg.inv(unheld))
-    covariance += np.diag([p.floor, p.floor, p.turn_floor]) ** 2
-    spread, directions = np.linalg.eigh(covariance[:2, :2])
-    least = np.arctan2(directions[1, 1], directions[0, 1])
-    deviations = np.sqrt([spread[1], spread[0], covariance[2, 2]])
-    return np.array([*deviations, _undirected(float(least))])
+    system = information / p.noise**2
+    system[_DIAGONAL] += np.array([p.step, p.step, p.turn]) ** -2
+    covariance = np.linalg.inv(system)
+    covariance[_DIAGONAL] += np.array([p.floor, p.floor, p.turn_floor]) ** 2
+    across, along, least = ellipse(covariance)
+    turn = float(covariance[2, 2])
+    return np.array([math.sqrt(along), math.sqrt(across), math.sqrt(turn), least])
 
 
 def turn_uncertainty(uncertainty: FloatArray, angle: float) -> FloatArray:
