@@ -132,7 +132,9 @@ class PointMap {
     for (Point& point : fresh) {  // afterwards: a block's own points do not thin each other
       point.number = first_ + static_cast<int64_t>(known_.size());
       reach_out(point.x, point.y);
-      cells_[cell_of(point.x, point.y)].push_back(point);
+      std::vector<Point>& here = cells_[cell_of(point.x, point.y)];
+      if (here.empty()) tell_around(index(point.x) - left_, index(point.y) - low_);
+      here.push_back(point);
       known_.push_back({point.x, point.y, point.nx, point.ny, block_});
       seen_in_.back().push_back(point.number);
       sample(point.number);
@@ -275,6 +277,7 @@ class PointMap {
   std::deque<std::vector<int64_t>> seen_in_ = {{}};     // numbers seen in each of the last blocks
   int64_t left_ = 0, low_ = 0, columns_ = 0, rows_ = 0;  // the cells there are
   std::vector<std::vector<Point>> cells_;
+  std::vector<uint8_t> empty_;  // rings about each cell, itself the first, that hold no point for sure
   mutable std::vector<Known> sampled_;  // of the points that are there, those with a multiple of `every_`, if it is set
   mutable std::vector<int64_t> numbers_;  // of these
   mutable int64_t every_ = 0;
@@ -328,6 +331,20 @@ class PointMap {
     return static_cast<size_t>((index(x) - left_) * rows_ + (index(y) - low_));
   }
 
+  // Tells the cells about one that it holds a point.
+  void tell_around(int64_t i, int64_t j) {
+    for (int64_t a = std::max<int64_t>(0, i - kRings); a <= std::min(columns_ - 1, i + kRings); ++a) {
+      uint8_t* column = empty_.data() + a * rows_;
+      for (int64_t b = std::max<int64_t>(0, j - kRings); b <= std::min(rows_ - 1, j + kRings); ++b)
+        column[b] = std::min(column[b], static_cast<uint8_t>(std::max(std::abs(a - i), std::abs(b - j))));
+    }
+  }
+
+  int64_t empty_rings(int64_t i, int64_t j) const {
+    if (i < left_ || i >= left_ + columns_ || j < low_ || j >= low_ + rows_) return 0;
+    return empty_[static_cast<size_t>((i - left_) * rows_ + (j - low_))];
+  }
+
   // Makes room for a place outside: the grid grows by half its size at least.
   void reach_out(double x, double y) {
     const int64_t i = index(x), j = index(y);
@@ -354,6 +371,10 @@ class PointMap {
       }
     cells_ = std::move(cells);
     left_ = left, low_ = low, columns_ = columns, rows_ = rows;
+    empty_.assign(cells_.size(), static_cast<uint8_t>(kRings + 1));
+    for (int64_t i = 0; i < columns_; ++i)
+      for (int64_t j = 0; j < rows_; ++j)
+        if (!cells_[i * rows_ + j].empty()) tell_around(i, j);
   }
 
   void renew(int64_t number) {
@@ -434,7 +455,7 @@ class PointMap {
     }
     const int64_t farthest = std::max(std::max(i - left_, left_ + columns_ - 1 - i),
                                       std::max(j - low_, low_ + rows_ - 1 - j));
-    for (int64_t r = 0; r <= farthest; ++r) {
+    for (int64_t r = empty_rings(i, j); r <= farthest; ++r) {
       const double gap = r == 0 ? 0.0 : inner + (r - 1) * cell_;  // nothing in this ring is nearer
       if (gap * gap > best || (r > 0 && gap >= reach)) {
         next = std::min(next, gap * gap);
@@ -552,6 +573,7 @@ class PointMap {
   static constexpr double kWeakest = 1e-6;  // [1/m², 1/rad²] so that a start without pairs stays
   static constexpr double kRounding = 1e-9;  // [m] by which places may err
   static constexpr int64_t kMargin = 16;  // cells around what is there
+  static constexpr int64_t kRings = 6;    // about a point, whose cells know of it
   static constexpr int64_t kMaxCells = int64_t{1} << 26;
 };
 

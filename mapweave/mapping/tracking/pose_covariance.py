@@ -17,7 +17,6 @@ from mapweave.parameters import StageParameters, derived
 EXACT: FloatArray = np.zeros(4)
 """Of a pose that was given and not found, as that of the scan that defines the frame."""
 EXACT.setflags(write=False)
-_DIAGONAL = np.diag_indices(3)
 
 
 class PoseCovarianceParameters(StageParameters):
@@ -59,17 +58,31 @@ def pose_uncertainty(
     if not information.any():
         return EXACT
     p = parameters or PoseCovarianceParameters()
-    system = information / p.noise**2
-    system[_DIAGONAL] += np.array([p.step, p.step, p.turn]) ** -2
-    covariance = np.linalg.inv(system)
-    covariance[_DIAGONAL] += np.array([p.floor, p.floor, p.turn_floor]) ** 2
-    across, along, least = ellipse(covariance)
-    turn = float(covariance[2, 2])
-    return np.array([math.sqrt(along), math.sqrt(across), math.sqrt(turn), least])
+    xx, xy, yy, turn = _covariance(information, p)
+    spread = np.array([[xx + p.floor**2, xy], [xy, yy + p.floor**2]])
+    across, along, least = ellipse(spread)
+    return np.array([math.sqrt(along), math.sqrt(across), math.hypot(turn**0.5, p.turn_floor), least])
+
+
+def _covariance(
+    information: FloatArray, p: PoseCovarianceParameters
+) -> tuple[float, float, float, float]:
+    """Return what `information` and steps as they are leave open: xx, xy, yy, and of the turn.
+
+    The inverse of the sum, by cofactors in plain floats, at every scan.
+    """
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = (information / p.noise**2).tolist()
+    xx, yy, tt = xx + p.step**-2, yy + p.step**-2, tt + p.turn**-2
+    first, second, third = yy * tt - yt * yt, xt * yt - xy * tt, xy * yt - xt * yy
+    whole = xx * first + xy * second + xt * third
+    return first / whole, second / whole, (xx * tt - xt * xt) / whole, (xx * yy - xy * xy) / whole
 
 
 def turn_uncertainty(uncertainty: FloatArray, angle: float) -> FloatArray:
     """Return (..., 4) `uncertainty` in a frame in which its own is turned by `angle` [rad]."""
+    if uncertainty.ndim == 1:
+        along, across, turn, direction = uncertainty.tolist()
+        return np.array([along, across, turn, math.remainder(2 * (direction + angle), 2 * math.pi) / 2])
     turned = np.array(uncertainty, dtype=float)
     turned[..., 3] = _undirected(turned[..., 3] + angle)
     return turned
