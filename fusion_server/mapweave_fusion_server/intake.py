@@ -5,52 +5,60 @@ and dropped. Knows no clock.
 """
 
 import logging
-from collections import defaultdict
 from collections.abc import Set
+from typing import TypeVar
 
-from mapweave.errors import FileError, InvalidIdError
+from mapweave.errors import InvalidIdError
 from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, pair_of
 from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import RobotReport
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.assembler import MapAssembler, MapSender
+from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import (
     Arrival,
     alignment_reader,
+    held_orders_reader,
     map_reader,
+    marks_reader,
+    order_reader,
     read_coordinator,
     status_reader,
 )
 from mapweave_protocol.link.lacking import Lacking
 from mapweave_protocol.narration.story import Story
-from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.keys import LIVE
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
     MapMessage,
+    MarksMessage,
+    OrderMessage,
     StatusMessage,
 )
+from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.pairs import Run
 
+M = TypeVar("M", bound=Message)
 _log = logging.getLogger(__name__)
 
 
 def last_version(store: Store) -> JointMap | None:
-    """Return the last version that `store` remembers, None when there is none.
-
-    Raises
-    ------
-    FileError
-        If it is unreadable.
-    """
+    """Return the last version that `store` remembers, None when there is none to be read."""
     payload = store.version(store.latest_version)
+    message = None if payload is None else _remembered(JointMapMessage, payload)
+    return None if message is None else message.unpack()
+
+
+def _remembered(kind: type[M], payload: bytes) -> M | None:
+    """Return a message of the store; what is not valid costs itself, not the store."""
     try:
-        return decode(JointMapMessage, payload).unpack() if payload is not None else None
+        return decode(kind, payload)
     except MessageError as error:
-        raise FileError(store.path, f"the store is damaged: {error}") from error
+        _log.warning("the store: %s; left out", error)
+        return None
 
 
 class Intake:
@@ -71,19 +79,26 @@ class Intake:
         self._maps = map_reader()
         self._alignments = alignment_reader()
         self._statuses = status_reader()
+        self._marks = marks_reader()
+        self._orders = order_reader()
+        self._held_orders = held_orders_reader()
         self._heard: dict[Run, StatusMessage] = {}
         self._last_heard: dict[str, float] = {}
         self._lacking = Lacking()
         self._assembler = MapAssembler()
-        self._packers: defaultdict[Run, MapSender] = defaultdict(MapSender)
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
         self._warned_of_too_many = False
+        self._warned_of_orders = False
 
     @property
     def refused(self) -> int:
         """How many messages were dropped because they were not what they should be."""
-        return self._maps.refused + self._alignments.refused + self._statuses.refused
+        readers = (
+            *(self._maps, self._alignments, self._statuses),
+            *(self._marks, self._orders, self._held_orders),
+        )
+        return sum(reader.refused for reader in readers)
 
     @property
     def reports(self) -> tuple[RobotReport, ...]:
@@ -100,23 +115,25 @@ class Intake:
         )
 
     def restore(self) -> None:
-        """Take up what the store remembers; what the last version was made of is no news.
-
-        Raises
-        ------
-        FileError
-            If the store holds something unreadable.
-        """
-        try:
-            for payload in self._store.last_maps():
-                robot_map = self._assembler.update(decode(MapMessage, payload))
-                if robot_map is not None:
-                    self._coordinator.receive_map(robot_map)
-            for payload in self._store.last_alignments():
-                self._coordinator.receive_alignments(decode(AlignmentMessage, payload))
-        except MessageError as error:
-            raise FileError(self._store.path, f"the store is damaged: {error}") from error
-        if not self._store.holds_news:
+        """Take up what the store remembers; what the last version was made of is no news."""
+        for payload in self._store.last_maps():
+            message = _remembered(MapMessage, payload)
+            robot_map = None if message is None else self._assembler.update(message)
+            if robot_map is not None:
+                self._coordinator.receive_map(robot_map)
+        for payload in self._store.last_alignments():
+            found = _remembered(AlignmentMessage, payload)
+            if found is not None:
+                self._coordinator.receive_alignments(found)
+        for payload in self._store.last_marks():
+            marks = _remembered(MarksMessage, payload)
+            if marks is not None:
+                self._coordinator.receive_marks(marks)
+        for payload in self._store.orders():
+            order = _remembered(OrderMessage, payload)
+            if order is not None:
+                self._coordinator.receive_order(order)
+        if self._coordinator.has_version and not self._store.holds_news:
             self._coordinator.forget_news()
 
     def take(self, arrival: Arrival, received: float) -> None:
@@ -135,20 +152,69 @@ class Intake:
                 self._heard[status.robot, status.boot] = status
                 self._last_heard[status.robot] = received
                 record(self._story.status(status))
+        elif self._takes_what_was_said(arrival, received):
+            return
         elif (coordinator := read_coordinator(arrival)) is not None:
             boot, here = coordinator
             record(self._story.coordinator(boot, here=here))
         elif LIVE.matches(arrival.key):
             self._take_presence(arrival)
 
+    def _takes_what_was_said(self, arrival: Arrival, received: float) -> bool:
+        """Take marks and orders; return whether `arrival` was any."""
+        if self._marks.reads(arrival):
+            marks = self._marks.read(arrival)
+            if marks is not None and self._coordinator.receive_marks(marks):
+                self._store.keep_marks((marks.robot, marks.boot), received, arrival.payload)
+        elif self._orders.reads(arrival):
+            order = self._orders.read(arrival)
+            if order is not None:
+                self.take_order(order, received)
+        elif self._held_orders.reads(arrival):
+            held = self._held_orders.read(arrival)
+            for order in held.orders if held is not None else ():
+                self.take_order(order, received)
+        else:
+            return False
+        return True
+
+    def take_order(self, order: OrderMessage, received: float) -> None:
+        """Take an operator's order, which came at `received` [s since 1970]."""
+        if self._coordinator.receive_order(order):
+            self._store.add_order(order.id, received, encode(order))
+        elif self._coordinator.orders.is_full and not self._warned_of_orders:
+            self._warned_of_orders = True
+            _log.warning("order %s of %s ignored: there are too many already", order.id, order.by)
+
     def _held_version(self, robot: str) -> int | None:
         held = self._coordinator.map_of(robot)
         return None if held is None else held.version
 
-    def robots_to_ask(self, now: float) -> list[str]:
-        """Return those whose map, by what they have said, has not arrived; `now` [s], any clock."""
+    def robots_to_ask(self, now: float) -> tuple[list[str], list[str]]:
+        """Return whom to ask for what has not arrived, by what they have said.
+
+        Parameters
+        ----------
+        now
+            [s] by any clock.
+
+        Returns
+        -------
+        maps
+            Those whose map is not here.
+        orders
+            Those who hold other orders than are here.
+        """
         heard, self._heard = self._heard, {}
-        return [robot for (robot, _), status in heard.items() if self._lacks_map(status, now)]
+        maps = [robot for (robot, _), status in heard.items() if self._lacks_map(status, now)]
+        orders = [robot for (robot, _), status in heard.items() if self._lacks_orders(status, now)]
+        return maps, orders
+
+    def _lacks_orders(self, status: StatusMessage, now: float) -> bool:
+        held = self._coordinator.orders.digest
+        lacks = status.orders not in (b"", held)
+        who = f"orders {status.robot} {status.boot}"
+        return self._lacking.due(who, (held, status.orders), now, lacks=lacks)
 
     def _lacks_map(self, status: StatusMessage, now: float) -> bool:
         held = self._coordinator.version_of(status.robot, status.boot)
@@ -176,7 +242,7 @@ class Intake:
     def _pack(self, robot_map: RobotMap) -> bytes | None:
         """Return the complete message; None if the parts that came make too large a whole."""
         try:
-            return self._packers[robot_map.robot, robot_map.boot].payload(robot_map, complete=True)
+            return encode(self._assembler.complete(robot_map))
         except MessageError as error:
             if robot_map.robot not in self._too_large:
                 self._too_large.add(robot_map.robot)

@@ -11,14 +11,15 @@ import zenoh
 from mapweave.config import Config
 from mapweave.errors import MapweaveError
 from mapweave_fusion_server.answers import answer
-from mapweave_fusion_server.builder import VersionBuilder
+from mapweave_fusion_server.builder import Built, VersionBuilder
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
+from mapweave_fusion_server.storage.database import UnwritableError
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_protocol.link import session
-from mapweave_protocol.link.asking import request_all_of
+from mapweave_protocol.link.asking import request_all_of, request_orders_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.narration.story import Story
@@ -31,6 +32,7 @@ POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
 ANSWERERS = 4  # one slow asker must not keep the others waiting
 WAITING_QUERIES = 256
 STATUS_INTERVAL = 1.0  # [s]
+RUNS_MARKED = 16  # of a robot whose marks come from its publisher's cache
 
 _log = logging.getLogger(__name__)
 
@@ -74,13 +76,14 @@ class Service:
         self._story = Story()
         latest = last_version(store)
         self._frames = frames_of(latest)
-        self._coordinator = Coordinator(parameters, latest)
+        self._coordinator = Coordinator(parameters, latest, store.latest_version)
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
         self._boot = keys.new_boot()
         self._status_due = 0.0
         self._builder = VersionBuilder(store.series, config or Config())
+        self._covers = 0
         self._started = time.time()
         self._feed = feed or Feed()
         self._feed.show_version(store.latest_version, self._coordinator.maps)
@@ -113,11 +116,23 @@ class Service:
         now = time.monotonic()
         if self._coordinator.seconds_until_due(now) <= 0:
             self._begin()
-        for robot in self._intake.robots_to_ask(now):
+        self._take_orders_of_page()
+        maps_of, orders_of = self._intake.robots_to_ask(now)
+        for robot in maps_of:
             request_all_of(self._session, self._team, robot, self._inbox.put)
+        for robot in orders_of:
+            request_orders_of(self._session, self._team, robot, self._inbox.put)
         if now >= self._status_due:
+            self._resume_storing()
             self._publish_status()
             self._status_due = now + STATUS_INTERVAL
+
+    def _take_orders_of_page(self) -> None:
+        """Take what was ordered on the live page, and say it to those who keep orders as well."""
+        for order in self._feed.orders():
+            self._intake.take_order(order, time.time())
+            key = keys.ORDER.build(team=self._team, name=order.by, order=str(order.kind))
+            self._session.put(key, encode(order))
 
     def _finish(self) -> None:
         """Take what has arrived and publish what it makes."""
@@ -132,19 +147,36 @@ class Service:
             _log.warning("%d messages were not valid and dropped", self._intake.refused)
 
     def _begin(self) -> None:
+        self._covers = self._store.news
         self._builder.start(self._coordinator.begin(time.monotonic()), time.time())
 
     def _conclude(self) -> None:
         built = self._builder.take()
         if built is not None:
             # Stored first: what was published once must be there after a crash.
-            self._store.add_version(built.draft.version, built.begun, built.payload)
-            self._publisher.put(built.payload)
+            self._publisher.put(self._keep(built))
             self._frames = frames_of(built.joint)
             self._status_due = 0.0  # robots wait for their new frames
             self._feed.show_version(built.draft.version, built.draft.maps)
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
+
+    def _keep(self, built: Built) -> bytes:
+        """Store a version; return its message, of another series where there is no room."""
+        number, payload = built.draft.version, built.payload
+        try:
+            self._store.add_version(number, built.begun, payload, self._covers)
+        except UnwritableError as error:
+            self._store.hold()
+            self._builder.series = self._store.series
+            payload = self._builder.packed(built.joint)
+            self._store.add_version(number, built.begun, payload, self._covers)
+            _log.error("%s; going on without it until there is room", error)
+        return payload
+
+    def _resume_storing(self) -> None:
+        if not self._store.is_storing and self._store.resume():
+            _log.info("the store can be written again: all that waited is in it")
 
     def _publish_again(self) -> None:
         """Publish the latest version of the store: the cache died with the last publisher."""
@@ -163,6 +195,8 @@ class Service:
             maps=self._coordinator.maps_held,
             alignments=self._coordinator.alignments_held,
             frames=self._frames,
+            marks=self._coordinator.marks_held,
+            orders=self._coordinator.orders.digest,
         )
         self._statuses.put(encode(status))
         self._feed.show_team(
@@ -200,6 +234,10 @@ class Service:
             for subscriber in (
                 session.declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
                 session.declare_subscriber(self._session, alignments, put),
+                session.declare_subscriber(
+                    self._session, keys.MARK.pattern(team=self._team), put, history=RUNS_MARKED
+                ),
+                self._session.declare_subscriber(keys.ORDER.pattern(team=self._team), put),
                 self._session.declare_subscriber(statuses, put),
                 self._session.liveliness().declare_subscriber(others, put, history=True),
                 self._session.liveliness().declare_subscriber(live, put, history=True),

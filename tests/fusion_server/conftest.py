@@ -3,13 +3,14 @@
 The maps are of an L-shaped room, seen by robots that never were.
 """
 
+import resource
 import secrets
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TypeAlias
@@ -19,6 +20,7 @@ import pytest
 import zenoh
 import zenoh.ext as ze
 
+from mapweave.evidence import Evidence
 from mapweave.geometry import se2
 from mapweave.maps import (
     Alignment,
@@ -85,12 +87,14 @@ def _make_alignments(
     transform: tuple[float, float, float] = (0.0, 0.0, 0.0),
     confidence: float = 0.9,
     reason: str = "40 m of wall in common",
+    evidence: Mapping[str, float] | None = None,
 ) -> AlignmentMessage:
     """Return what robot `reference` found for the first component of both."""
     ends = (component_name(m.robot, min(m.components, default=0)) for m in (reference, other))
     ours, theirs = ends
     cause = Reason.words(reason)
-    alignment = Alignment(ours, theirs, np.array(transform), decision, confidence, cause)
+    measured = Evidence.of(evidence or {})
+    alignment = Alignment(ours, theirs, np.array(transform), decision, confidence, cause, measured)
     return AlignmentMessage.pack(
         reference.robot, MapVersion.of(reference), MapVersion.of(other), [alignment]
     )
@@ -132,6 +136,12 @@ class ServerProcess:
             assert self._process.poll() is None, self.log
             assert time.monotonic() < deadline, self.log
             time.sleep(0.02)
+
+    def limit_files(self, size: int | None) -> None:
+        """Let no file it writes grow beyond `size` [bytes], as if the disk were full."""
+        _, hard = resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE)
+        soft = resource.RLIM_INFINITY if size is None else size
+        resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE, (soft, hard))
 
     def stop(self, how: int = signal.SIGINT) -> int:
         """Signal it, wait for its end, and return its exit status."""
