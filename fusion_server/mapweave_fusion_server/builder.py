@@ -10,7 +10,7 @@ from mapweave.maps import JointMap
 from mapweave.team.joining import JointParameters
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.joint_optimization import JointOptimizationParameters
-from mapweave_fusion_server.coordinator import Draft
+from mapweave_fusion_server.draft import Draft
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import JointMapMessage
 

@@ -5,17 +5,14 @@ Pure logic: no network, no clock (`now` is passed in), no threads. The caller ru
 
 import math
 from collections.abc import Iterator, Set
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name, parse_component
-from mapweave.orders import Order
-from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
-from mapweave.team.revocation import mark_revoked
+from mapweave_fusion_server.draft import Draft
 from mapweave_fusion_server.said import Said
 from mapweave_protocol.link.order_ledger import OrderLedger
 from mapweave_protocol.wire.messages import (
@@ -56,40 +53,6 @@ class Urgency(IntEnum):
     NONE = 0
     SOON = 1
     NOW = 2
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Draft:
-    """All that goes into a version; building it takes seconds and changes nothing here.
-
-    Attributes
-    ----------
-    version
-        Its number.
-    maps, alignments
-        All that are known.
-    before
-        The alignments of the last version, as it judged them.
-    orders
-        Of operators, marks apart: those are on the maps.
-    """
-
-    version: int
-    maps: tuple[RobotMap, ...]
-    alignments: tuple[Alignment, ...]
-    before: tuple[Alignment, ...] = ()
-    orders: tuple[Order, ...] = ()
-
-    def build(self, builder: JointMapBuilder) -> JointMap:
-        """Return the joint map; what it revokes of the last version, it names.
-
-        Parameters
-        ----------
-        builder
-            Keeps what it made for the versions before.
-        """
-        joint = builder.build(self.maps, self.alignments, self.version, self.orders)
-        return mark_revoked(joint, self.before)
 
 
 class Coordinator:

@@ -7,7 +7,7 @@ from mapweave.maps import JointMap
 from mapweave.team.joining import JointParameters
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave_fusion_server.builder import VersionBuilder
-from mapweave_fusion_server.coordinator import Draft
+from mapweave_fusion_server.draft import Draft
 
 GIVEN: list[JointParameters] = []
 

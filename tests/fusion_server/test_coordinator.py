@@ -16,8 +16,8 @@ from mapweave_fusion_server.coordinator import (
     MAX_RUNS,
     Coordinator,
     CoordinatorParameters,
-    Draft,
 )
+from mapweave_fusion_server.draft import Draft
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import JointMapMessage
 from mapweave_protocol.wire.model import WORLD_REACH

@@ -1,0 +1,42 @@
+"""What a version of the joint map is made of, fixed while it is being built."""
+
+from dataclasses import dataclass
+
+from mapweave.maps import Alignment, JointMap, RobotMap
+from mapweave.orders import Order
+from mapweave.team.joint_builder import JointMapBuilder
+from mapweave.team.revocation import mark_revoked
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """All that goes into a version; building it takes seconds and changes nothing here.
+
+    Attributes
+    ----------
+    version
+        Its number.
+    maps, alignments
+        All that are known.
+    before
+        The alignments of the last version, as it judged them.
+    orders
+        Of operators, marks apart: those are on the maps.
+    """
+
+    version: int
+    maps: tuple[RobotMap, ...]
+    alignments: tuple[Alignment, ...]
+    before: tuple[Alignment, ...] = ()
+    orders: tuple[Order, ...] = ()
+
+    def build(self, builder: JointMapBuilder) -> JointMap:
+        """Return the joint map; what it revokes of the last version, it names.
+
+        Parameters
+        ----------
+        builder
+            Keeps what it made for the versions before.
+        """
+        joint = builder.build(self.maps, self.alignments, self.version, self.orders)
+        return mark_revoked(joint, self.before)
