@@ -96,8 +96,8 @@ class AgentRun:
         self._tell = tell
         self._publication = PublicationSchedule(parameters.map_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
-        if past:
-            self._comparisons.earlier_map(past[-1].map)
+        for run in past:
+            self._comparisons.earlier_map(run.map)
         self._needs = Needs(mapper.robot)
         self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
         self._reception = Dispatcher(

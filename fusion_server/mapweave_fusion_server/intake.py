@@ -35,7 +35,7 @@ from mapweave_protocol.wire.messages import (
     StatusMessage,
 )
 from mapweave_protocol.wire.model import Message
-from mapweave_protocol.wire.pairs import Run
+from mapweave_protocol.wire.pairs import Run, name_with_boot, run_of
 
 M = TypeVar("M", bound=Message)
 _log = logging.getLogger(__name__)
@@ -163,12 +163,16 @@ class Intake:
             last = max(new.components)
             self._store.keep_map((new.robot, new.boot), last, received, complete)
             record(self._story.mapped(new))
-        elif self._coordinator.clashes(new) and new.boot not in self._clashing:
+            self._tell_clash(new)
+
+    def _tell_clash(self, new: RobotMap) -> None:
+        if self._coordinator.clashes(new) and new.boot not in self._clashing:
             self._clashing.add(new.boot)
             _log.warning(
-                "map of %s ignored: another run of it has components of the same numbers; start its"
-                " agent again while the coordinator is here, with the --state it had",
+                "map of %s: another run of it has components of the same numbers; this one's are"
+                " named %s/…; give each robot an id of its own",
                 new.robot,
+                name_with_boot(run_of(new)),
             )
 
     def _pack(self, robot_map: RobotMap) -> bytes | None:

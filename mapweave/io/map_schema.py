@@ -20,7 +20,7 @@ from pydantic import (
 
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry.arrays import FloatArray
-from mapweave.ids import ID_PATTERN
+from mapweave.ids import ID_PATTERN, RUN_PATTERN
 from mapweave.maps import (
     Alignment,
     Decision,
@@ -64,7 +64,7 @@ _Deviation: TypeAlias = Annotated[float, Field(ge=0, le=1e6)]
 _UncertaintyRow: TypeAlias = tuple[_Deviation, _Deviation, _Deviation, float]
 _RobotId: TypeAlias = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 _ComponentName: TypeAlias = Annotated[
-    str, StringConstraints(pattern=ID_PATTERN.removesuffix("$") + "/[0-9]{1,9}$")
+    str, StringConstraints(pattern=RUN_PATTERN.removesuffix("$") + "/[0-9]{1,9}$")
 ]
 
 

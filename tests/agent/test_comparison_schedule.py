@@ -194,7 +194,7 @@ def test_a_run_is_compared_with_the_one_before_it_once_for_each_of_its_maps() ->
 
 
 def test_a_map_of_an_earlier_run_of_a_peer_does_not_replace_that_of_the_later() -> None:
-    plan = plan_of("a", "b")
+    plan = ComparisonSchedule("a", PARAMETERS)
     for robot_map in (a_run("b", 1, "now"), a_run("b", 0, "before")):
         plan.peer_map(robot_map)
     assert plan.held == (MapVersion(robot="b", boot="now", version=1),)

@@ -16,6 +16,7 @@ from mapweave.maps import component_name
 from mapweave.scan.scan import Scan
 from mapweave_protocol.wire.messages import JointStatusMessage, PoseMessage
 from mapweave_protocol.wire.model import to_transform
+from mapweave_protocol.wire.pairs import name_with_boot
 from mapweave_protocol.wire.pose_message import JointPose, to_covariance
 
 _log = logging.getLogger(__name__)
@@ -35,6 +36,8 @@ class Whereabouts:
     def __init__(self, robot: str, boot: str, first: int) -> None:
         self._robot = robot
         self._boot = boot
+        # By its boot where another run claims the same component.
+        self._names = name_with_boot((robot, boot)), robot
         self._first = first
         self._placement: Placement | None = None
         self._status: JointStatusMessage | None = None
@@ -43,7 +46,7 @@ class Whereabouts:
 
     def coordinator(self, status: JointStatusMessage) -> None:
         """Take in which frames the latest joint map has."""
-        own = {name for name in status.frames if name.rpartition("/")[0] == self._robot}
+        own = {name for name in status.frames if name.rpartition("/")[0] in self._names}
         with self._frames:
             self._status = status
             for name in sorted(own | set(self._since)):
@@ -76,15 +79,18 @@ class Whereabouts:
             component=component,
             pose=to_transform(last.pose),
             covariance=to_covariance(covariance),
-            joint=self._joint(component, last.pose, covariance),
+            joint=self._joint(self._first + last.component, last.pose, covariance),
         )
 
-    def _joint(self, component: str, pose: FloatArray, covariance: FloatArray) -> JointPose | None:
+    def _joint(self, number: int, pose: FloatArray, covariance: FloatArray) -> JointPose | None:
         with self._frames:
-            if self._status is None or component not in self._status.frames:
+            frames = {} if self._status is None else self._status.frames
+            names = (component_name(name, number) for name in self._names)
+            name = next((name for name in names if name in frames), None)
+            if name is None:
                 return None
-            place = self._status.frames[component]
-            frame, since = self._since[component]
+            place = frames[name]
+            frame, since = self._since[name]
         to_joint = np.eye(3)
         to_joint[:2, :2] = se2.rotation(place.pose[2])
         return JointPose(
