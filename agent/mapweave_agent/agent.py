@@ -15,7 +15,7 @@ from mapweave.scan.scan import Scan
 from mapweave.team.hysteresis import keep_joined
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
-from mapweave_agent.dispatch import Dispatcher
+from mapweave_agent.dispatch import Dispatcher, listening
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -24,17 +24,7 @@ from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
-from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
-from mapweave_protocol.link.session import declare_subscriber
-from mapweave_protocol.wire.keys import (
-    ALIGNMENT,
-    COORDINATOR_LIVE,
-    JOINT_STATUS,
-    LIVE,
-    MAP,
-    STATUS,
-)
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
@@ -95,6 +85,7 @@ class AgentRun:
         self._first = first
         self._tell = tell
         self._publication = PublicationSchedule(parameters.map_interval)
+        self._keeping = PublicationSchedule(parameters.state_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
         for run in past:
             self._comparisons.earlier_map(run.map)
@@ -110,6 +101,7 @@ class AgentRun:
         self._published: RobotMap = mapper.robot_map()
         self._scans_seen = 0
         self._changed = False
+        self._unkept = False
         self._finished = False
         self._status_due = 0.0
 
@@ -166,7 +158,8 @@ class AgentRun:
 
     @contextmanager
     def _in_the_team(self) -> Iterator[None]:
-        with self._outbox, self._listening():
+        listened = listening(self._session, self._team, self._mapper.robot, self._inbox.put)
+        with self._outbox, listened:
             _log.info("%s joins team %s", self._mapper.robot, self._team)
             yield
             if self._reception.refused:
@@ -176,6 +169,15 @@ class AgentRun:
         if not stopping():
             self._finish()
         while not stopping():
+            self._attend(POLL)
+        self._leave()
+
+    def _leave(self) -> None:
+        """Publish what is not yet, and wait a moment for the coordinators that are here."""
+        if self._changed and not self._finished:
+            self._publish_map(complete=False)
+        deadline = time.monotonic() + self._parameters.leave_within
+        while not self._needs.delivered(self._state_published) and time.monotonic() < deadline:
             self._attend(POLL)
 
     def _map_all(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
@@ -198,6 +200,7 @@ class AgentRun:
             self._tell(pose)
         self._scans_seen += 1
         self._changed |= placement.placed
+        self._unkept |= placement.placed
         if placement.submap_finished or placement.lost:
             self._publication.hurry()
         if placement.lost:
@@ -228,6 +231,8 @@ class AgentRun:
         now = time.monotonic()
         if self._changed and not self._finished and self._publication.due(now):
             self._publish_map(complete=False)
+        if self._unkept and not self._finished and self._keeping.due(now):
+            self._keep(self._draw())
         self._compare(now)
         self._supply(now)
         if now >= self._status_due:
@@ -235,8 +240,9 @@ class AgentRun:
 
     def _supply(self, now: float) -> None:
         """Send again what others lack, and answer who has asked."""
-        own = MapVersion.of(self._published) if self._published.submaps else None
-        missing = self._needs.missing(own, self._outbox.found, now, self._past)
+        found = [m for run in self._past.values() for m in run.found]
+        found += [*self._comparisons.orphans, *self._outbox.found]
+        missing = self._needs.missing(self._state_published, found, now, self._past)
         if missing.map:
             self._outbox.send_map(self._published, complete=True)
         for run in missing.past:
@@ -274,19 +280,33 @@ class AgentRun:
             found,
         )
         self._outbox.send_alignments(message)
+        self._state.keep_found(self._mapper.boot, self._outbox.found)
         return found
 
     def _publish_map(self, *, complete: bool) -> None:
         self._changed = False
-        with self._mapping:
-            snapshot = self._mapper.snapshot()
-        mapped = without_strays(snapshot.robot_map())
-        self._published = numbered_from(mapped, self._first)
+        self._published = self._draw()
         self._outbox.send_map(self._published, complete=complete)
         self._tell(self._published)
-        self._state.keep(self._published)
+        self._keep(self._published)
         self._comparisons.own_map(self._published, finished=self._finished)
         self._publication.published(time.monotonic())
+
+    def _draw(self) -> RobotMap:
+        """Return the map as it is now; what changes while it is drawn is still to be kept."""
+        self._unkept = False
+        with self._mapping:
+            snapshot = self._mapper.snapshot()
+        return numbered_from(without_strays(snapshot.robot_map()), self._first)
+
+    def _keep(self, robot_map: RobotMap) -> None:
+        self._state.keep(robot_map)
+        self._keeping.published(time.monotonic())
+
+    @property
+    def _state_published(self) -> MapVersion | None:
+        """Which state of the map was published last, None while there is nothing in it."""
+        return MapVersion.of(self._published) if self._published.submaps else None
 
     def _publish_status(self) -> None:
         status = StatusMessage(
@@ -308,25 +328,6 @@ class AgentRun:
         )
         self._outbox.send_status(status)
         self._status_due = time.monotonic() + self._parameters.status_interval
-
-    @contextmanager
-    def _listening(self) -> Iterator[None]:
-        """Subscribe to the peers' presence, then to what they say."""
-        robot, put = self._mapper.robot, self._inbox.put
-        live, maps = LIVE.pattern(team=self._team), MAP.pattern(team=self._team)
-        coordinators = COORDINATOR_LIVE.pattern(team=self._team)
-        as_reference = ALIGNMENT.pattern(team=self._team, reference=robot)
-        as_other = ALIGNMENT.pattern(team=self._team, other=robot)
-        with (
-            self._session.liveliness().declare_subscriber(live, put, history=True),
-            self._session.liveliness().declare_subscriber(coordinators, put, history=True),
-            declare_subscriber(self._session, as_reference, put),
-            declare_subscriber(self._session, as_other, put),
-            declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
-            self._session.declare_subscriber(STATUS.pattern(team=self._team), put),
-            self._session.declare_subscriber(JOINT_STATUS.build(team=self._team), put),
-        ):
-            yield
 
 
 def _scans_placed(robot_map: RobotMap) -> int:

@@ -42,6 +42,8 @@ class _Pair:
         The same, by us.
     met
         Whether their maps were joined once, by whomever.
+    learned
+        What another one found out last.
     rests_until
         While they still map, the pair is not compared before.
     """
@@ -49,6 +51,7 @@ class _Pair:
     compared: tuple[MapVersion, MapVersion] | None = None
     published: Compared | None = None
     met: bool = False
+    learned: AlignmentMessage | None = None
     rests_until: float = field(default=0.0)
 
 
@@ -117,8 +120,9 @@ class ComparisonSchedule:
     def learned(self, message: AlignmentMessage) -> None:
         """Take in what another found out about a pair: we need not do it again."""
         self._note_compared((message.reference, message.other))
-        if joins(message.unpack()):
-            self._pair(message.reference, message.other).met = True
+        pair = self._pair(message.reference, message.other)
+        pair.met |= joins(message.unpack())
+        pair.learned = message
         self._wake()
 
     def begin(self, now: float) -> Comparison | None:
@@ -153,9 +157,20 @@ class ComparisonSchedule:
             own_version=own.version, peer_boot=other.boot, peer_version=other.version
         )
         pair.met |= joins(found)
+        pair.learned = None
         rest = max(self._parameters.comparison_interval, took * self._parameters.comparison_rest)
         pair.rests_until = now + rest
         self._wake()
+
+    @property
+    def orphans(self) -> list[AlignmentMessage]:
+        """What robots that are gone have found, in this robot's name: it may be all there is."""
+        learned = (pair.learned for pair in self._pairs.values())
+        return [
+            message.model_copy(update={"robot": self._robot})
+            for message in learned
+            if message is not None and self._team.is_gone(message.robot)
+        ]
 
     @property
     def published(self) -> Mapping[str, Compared]:

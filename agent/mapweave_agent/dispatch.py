@@ -1,11 +1,15 @@
 """What a robot hears of its team, handed on to its plan of comparisons."""
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import zenoh
 
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
-from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
 from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.link.inbox import (
     Arrival,
@@ -17,8 +21,36 @@ from mapweave_protocol.link.inbox import (
     read_presence,
     status_reader,
 )
+from mapweave_protocol.link.session import OnSample, declare_subscriber
+from mapweave_protocol.wire.keys import (
+    ALIGNMENT,
+    COORDINATOR_LIVE,
+    JOINT_STATUS,
+    LIVE,
+    MAP,
+    STATUS,
+)
 
 _log = logging.getLogger(__name__)
+
+
+@contextmanager
+def listening(session: zenoh.Session, team: str, robot: str, put: OnSample) -> Iterator[None]:
+    """Subscribe to the presence of a robot's team, then to what concerns the robot."""
+    live, maps = LIVE.pattern(team=team), MAP.pattern(team=team)
+    coordinators = COORDINATOR_LIVE.pattern(team=team)
+    as_reference = ALIGNMENT.pattern(team=team, reference=robot)
+    as_other = ALIGNMENT.pattern(team=team, other=robot)
+    with (
+        session.liveliness().declare_subscriber(live, put, history=True),
+        session.liveliness().declare_subscriber(coordinators, put, history=True),
+        declare_subscriber(session, as_reference, put),
+        declare_subscriber(session, as_other, put),
+        declare_subscriber(session, maps, put, history=MESSAGES_TO_COMPLETE),
+        session.declare_subscriber(STATUS.pattern(team=team), put),
+        session.declare_subscriber(JOINT_STATUS.build(team=team), put),
+    ):
+        yield
 
 
 class Dispatcher:
@@ -96,6 +128,8 @@ class Dispatcher:
         count = self._coordinators.take(boot, here=here)
         if count:
             _log.warning(tell_coordinators(count))
+        if not here:
+            self._needs.coordinator_gone(boot)
 
     def _take_joint_status(self, arrival: Arrival) -> None:
         status = self._joint_statuses.read(arrival)

@@ -21,6 +21,7 @@ from mapweave_protocol.link.session import (
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, POSE, STATUS
 from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage, StatusMessage, Traffic
+from mapweave_protocol.wire.pairs import Run, states_of
 
 WAITING_QUERIES = 16
 KINDS = "map", "alignment", "pose", "status"
@@ -44,7 +45,7 @@ class Outbox:
         self._boot = boot
         self._sender = MapSender()
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
-        self._found: dict[tuple[str, str], AlignmentMessage] = {}
+        self._found: dict[frozenset[Run], AlignmentMessage] = {}
         self._messages = Counter(dict.fromkeys(KINDS, 0))
         self._bytes = Counter(dict.fromkeys(KINDS, 0))
         self._declared = ExitStack()
@@ -87,7 +88,7 @@ class Outbox:
 
     @property
     def found(self) -> Iterable[AlignmentMessage]:
-        """What was published last of each pair of robots."""
+        """What was published last of each pair of runs."""
         return self._found.values()
 
     def send_map(self, robot_map: RobotMap, *, complete: bool) -> None:
@@ -105,7 +106,7 @@ class Outbox:
         if publisher is None:
             publisher = declare_alignment_publisher(self._session, self._key_of(message))
             self._alignments[pair] = self._declared.enter_context(publisher)
-        self._found[pair] = message
+        self._found[frozenset(states_of((message.reference, message.other)))] = message
         self._put("alignment", publisher, encode(message))
 
     def send_status(self, message: StatusMessage) -> None:

@@ -1,6 +1,7 @@
-"""A robot's runs on disk, one file each: what a restarted agent numbers on from, and delivers.
+"""A robot's runs on disk: what a restarted agent numbers on from, and delivers.
 
-A file holds the whole map of a run, as the message that travels.
+Of each run a file holds the whole map, as the message that travels, and another one what was found
+of it and other runs: a list of such messages.
 """
 
 import logging
@@ -9,15 +10,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgpack
+
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError
 from mapweave.maps import RobotMap
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler, MapSender
-from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.messages import MapMessage, MapVersion
+from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.messages import AlignmentMessage, MapMessage, MapVersion
 
 SUFFIX = ".map"
+FOUND_SUFFIX = ".found"
 
 _log = logging.getLogger(__name__)
 
@@ -34,11 +38,14 @@ class PastRun:
         The same, as its message.
     age
         How long ago it was written [s].
+    found
+        What it found of pairs of runs.
     """
 
     map: RobotMap
     payload: bytes
     age: float
+    found: tuple[AlignmentMessage, ...] = ()
 
     @property
     def state(self) -> MapVersion:
@@ -75,6 +82,17 @@ class StateFolder:
         with replace_file(self.path / f"{robot_map.boot}{SUFFIX}") as new:
             new.write_bytes(payload)
 
+    def keep_found(self, boot: str, found: Iterable[AlignmentMessage]) -> None:
+        """Keep what a run has found in place of what it had found before.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        with replace_file(self.path / f"{boot}{FOUND_SUFFIX}") as new:
+            new.write_bytes(msgpack.packb([encode(message) for message in found]))
+
     def runs(self, robot: str, now: float) -> list[PastRun]:
         """Return the runs of `robot`, the earliest first; `now` [s since 1970].
 
@@ -95,7 +113,19 @@ class StateFolder:
         if robot_map is None or robot_map.robot != robot:
             _log.warning("%s: passed over, no whole map of %s", path, robot)
             return None
-        return PastRun(robot_map, payload, now - path.stat().st_mtime)
+        found = self._read_found(path.with_suffix(FOUND_SUFFIX))
+        return PastRun(robot_map, payload, now - path.stat().st_mtime, found)
+
+    def _read_found(self, path: Path) -> tuple[AlignmentMessage, ...]:
+        """Return what a run has found; nothing where it found nothing, or the file is damaged."""
+        if not path.exists():
+            return ()
+        try:
+            payloads = msgpack.unpackb(path.read_bytes())
+            return tuple(decode(AlignmentMessage, bytes(payload)) for payload in payloads)
+        except (MessageError, TypeError, ValueError) as error:
+            _log.warning("%s: passed over, %s", path, error)
+            return ()
 
 
 def default_folder(team: str, robot: str, environment: Mapping[str, str] = os.environ) -> Path:

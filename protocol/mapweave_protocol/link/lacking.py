@@ -6,7 +6,7 @@ must not be flooded, so it is done ever more rarely.
 
 from dataclasses import dataclass
 
-GRACE = 2.0  # [s] without progress before the first time: a reconnection takes one
+GRACE = 0.75  # [s] without progress before the first time: less than statuses are apart
 LONGEST = 60.0  # [s] between two times
 MAX_WATCHED = 4096  # names come from the network
 
