@@ -178,6 +178,18 @@ class Store:
         first, second = sorted(pair)
         self._keep((first, second), "alignment", (None, received, first, second), message)
 
+    def renew_alignments(self, pair: tuple[str, str], message: bytes) -> None:
+        """Keep `message` in place of the last one of its pair, of which it says the same."""
+        try:
+            with self._database.transaction(durable=False):
+                self._database.rows(
+                    "UPDATE alignment SET message = ?, checksum = ? WHERE id ="
+                    " (SELECT max(id) FROM alignment WHERE first = ? AND second = ?)",
+                    message, checksum(message), *sorted(pair),
+                )  # fmt: skip
+        except UnwritableError as error:
+            _log.warning("%s; what was found before stays", error)
+
     def last_alignments(self) -> list[bytes]:
         """Return the last message of every pair of runs, as far as it can be read."""
         numbers = self._database.rows(
@@ -192,14 +204,18 @@ class Store:
         """Keep the map of a run, a robot and a boot, in place of the last one of that run."""
         self._keep(run, "robot_map", (*run, last_component, received), message)
 
-    def map_of(self, robot: str) -> bytes | None:
-        """Return the map of a robot's last run, None when it was never heard of."""
+    def map_of(self, robot: str, boot: str | None = None) -> bytes | None:
+        """Return the map of a robot's run, by default its last; None when it was not heard of."""
         rows = self._database.rows(
-            "SELECT rowid, last_component FROM robot_map WHERE robot = ?"
-            " ORDER BY last_component DESC",
-            robot,
-        )
-        waiting = [row for row in self._held.of("robot_map") if row.values[0] == robot]
+            "SELECT rowid, last_component FROM robot_map WHERE robot = ?1"
+            " AND boot = coalesce(?2, boot) ORDER BY last_component DESC",
+            robot, boot,
+        )  # fmt: skip
+        waiting = [
+            row
+            for row in self._held.of("robot_map")
+            if row.values[0] == robot and boot in (None, row.values[1])
+        ]
         held = {int(str(row.values[2])): row.message for row in waiting}
         last = max(held, default=-1)
         for number, component in rows:
@@ -216,6 +232,29 @@ class Store:
             "SELECT rowid, robot, boot FROM robot_map ORDER BY robot, last_component"
         )
         return self._messages("robot_map", ((n, f"of {r}@{b}") for n, r, b in numbers))
+
+    def maps_since(self, version: int | None) -> list[bytes]:
+        """Return the maps of all runs, or those that are not in `version`."""
+        numbers = self._database.rows(
+            "SELECT rowid, robot, boot FROM robot_map WHERE news > ?"
+            " ORDER BY robot, last_component",
+            self._covered_by(version),
+        )
+        return self._messages("robot_map", ((n, f"of {r}@{b}") for n, r, b in numbers))
+
+    def alignments_since(self, version: int | None) -> list[bytes]:
+        """Return the last message of every pair of runs, unless it is in `version`."""
+        numbers = self._database.rows(
+            "SELECT max(id) AS last, first, second FROM alignment WHERE news > ?"
+            " GROUP BY first, second ORDER BY last",
+            self._covered_by(version),
+        )
+        return self._messages("alignment", ((n, f"of {a} and {b}") for n, a, b in numbers))
+
+    def _covered_by(self, version: int | None) -> int:
+        """Return the number of the last that came before `version`; 0 where that is not kept."""
+        rows = self._database.rows("SELECT covers FROM version WHERE number = ?", version or 0)
+        return int(rows[0][0]) if rows else 0
 
     @property
     def holds_news(self) -> bool:

@@ -1,6 +1,7 @@
 """Questions to the coordinator, answered from its store."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import zenoh
@@ -15,6 +16,7 @@ from mapweave_protocol.wire.queries import JointQuery
 ANSWER_WITHIN = 5.0  # [s]
 
 M = TypeVar("M", bound=Message)
+_log = logging.getLogger(__name__)
 
 
 def ask_joint_maps(
@@ -87,11 +89,33 @@ def request_all_of(
     )
 
 
+def ask_for_what_is_valid(
+    session: zenoh.Session, team: str, query: JointQuery, kind: type[M]
+) -> list[M]:
+    """Return the valid answers to `query`; of the others the first is told."""
+    answers: list[M] = []
+    warned = False
+    for payload in _payloads(session, team, query, ANSWER_WITHIN):
+        try:
+            answers.append(decode(kind, payload))
+        except MessageError as error:
+            if not warned:
+                _log.warning("answer ignored, %s", error)
+            warned = True
+    return answers
+
+
 def _ask(
     session: zenoh.Session, team: str, query: JointQuery, kind: type[M], timeout: float
 ) -> list[M]:
+    return [decode(kind, payload) for payload in _payloads(session, team, query, timeout)]
+
+
+def _payloads(
+    session: zenoh.Session, team: str, query: JointQuery, timeout: float
+) -> Iterator[bytes]:
     parameters = query.parameters
     selector = JOINT_QUERY.build(team=team) + (f"?{parameters}" if parameters else "")
     # The default keeps one reply a key; the answers to `since` all have the same.
     replies = session.get(selector, consolidation=zenoh.ConsolidationMode.NONE, timeout=timeout)
-    return [decode(kind, reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
+    return (reply.ok.payload.to_bytes() for reply in replies if reply.ok)

@@ -54,6 +54,8 @@ def session_config(endpoints: Sequence[str], mode: Mode = "client") -> zenoh.Con
         "connect/endpoints": list(endpoints),
         "connect/timeout_ms": int(ATTEMPT * 1000),
         "connect/exit_on_failure": True,
+        # Also after a long outage the link is back soon after the router can be reached.
+        "connect/retry": {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2},
     }
     return _config(settings, endpoints)
 

@@ -2,11 +2,13 @@
 
 Replies, one sample each, on the same key: to none and ``version=N`` a `JointMapMessage`, to
 ``since=N`` one for every version after N in their order (the first K with ``limit=K``), to
-``robot=ID`` a complete `MapMessage`.
+``robot=ID`` a complete `MapMessage` of that robot's last run (of another with ``boot=BOOT``), to
+``of=maps`` those of all runs, to ``of=alignments`` an `AlignmentMessage` for each pair of runs;
+with ``since=N`` only what came after version N was begun.
 """
 
 import re
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -14,10 +16,11 @@ from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.model import Count, Id
 
 _NUMBER = re.compile(r"[0-9]{1,15}")
+_NUMBERS = "version", "since", "limit"
 
 
 class JointQuery(BaseModel):
-    """A question to the coordinator: one of the three, or none for the latest joint map.
+    """A question to the coordinator: one of these, or none for the latest joint map.
 
     Attributes
     ----------
@@ -29,6 +32,10 @@ class JointQuery(BaseModel):
         No more of them than so many, those that come first.
     robot
         The last map of this robot, gone or not.
+    boot
+        Of which run of it.
+    of
+        All of these instead of joint maps.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -37,13 +44,19 @@ class JointQuery(BaseModel):
     since: Count | None = Field(default=None)
     limit: int | None = Field(default=None, ge=1, le=2**53)
     robot: Id | None = Field(default=None)
+    boot: Id | None = Field(default=None)
+    of: Literal["maps", "alignments"] | None = Field(default=None)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if len(self._given().keys() - {"limit"}) > 1:
-            raise ValueError("expected one of version, since and robot")
-        if self.limit is not None and self.since is None:
-            raise ValueError("limit, expected beside since only")
+        given = self._given().keys()
+        if len(given & {"version", "since", "robot"}) > 1 or given >= {"of", "robot"}:
+            raise ValueError("expected one of version, since, robot and of")
+        for name, beside in (("limit", "since"), ("boot", "robot")):
+            if name in given and beside not in given:
+                raise ValueError(f"{name}, expected beside {beside} only")
+        if "of" in given and not given <= {"of", "since"}:
+            raise ValueError("of, expected alone or beside since")
         return self
 
     @property
@@ -62,13 +75,16 @@ class JointQuery(BaseModel):
         """
         pairs = [part.partition("=") for part in parameters.split(";") if part]
         values: dict[str, int | str] = {
-            name: int(value) if name != "robot" and _NUMBER.fullmatch(value) else value
+            name: int(value) if name in _NUMBERS and _NUMBER.fullmatch(value) else value
             for name, _, value in pairs
         }
         try:
             return cls.model_validate(values)
         except ValueError as error:
-            expected = "expected one of version=N, since=N, since=N;limit=K, robot=ID, or nothing"
+            expected = (
+                "expected one of version=N, since=N, since=N;limit=K, robot=ID, robot=ID;boot=BOOT,"
+                " of=maps, of=alignments, since=N;of=maps, since=N;of=alignments, or nothing"
+            )
             raise MessageError("query", f"{parameters[:80]!r}: {expected}") from error
 
     def _given(self) -> dict[str, int | str]:
