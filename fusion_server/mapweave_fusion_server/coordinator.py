@@ -210,6 +210,10 @@ class Coordinator:
         self._raise_urgency(Urgency.NOW if joined_or_parted else Urgency.SOON)
         return True
 
+    def holds(self, message: AlignmentMessage) -> bool:
+        """Tell whether this is what is known of its pair of runs."""
+        return self._alignments.get(frozenset(states_of(_ends(message)))) is message
+
     def forget_news(self) -> None:
         """Take what was received so far as part of the last version: after a restart."""
         self._urgency = Urgency.NONE

@@ -186,10 +186,12 @@ class Intake:
             return None
 
     def _take_alignments(self, new: AlignmentMessage, payload: bytes, received: float) -> None:
+        reference, other = (name_with_boot(run_of(end)) for end in (new.reference, new.other))
         if self._coordinator.receive_alignments(new):
-            reference, other = (f"{end.robot}@{end.boot}" for end in (new.reference, new.other))
             self._store.add_alignments((reference, other), received, payload)
             record(self._story.aligned(new))
+        elif self._coordinator.holds(new):
+            self._store.renew_alignments((reference, other), payload)
 
     def _take_presence(self, arrival: Arrival) -> None:
         try:
