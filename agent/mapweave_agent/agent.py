@@ -24,6 +24,7 @@ from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
+from mapweave_protocol.link.asking import request_map
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, PoseMessage, StatusMessage
 
@@ -239,7 +240,7 @@ class AgentRun:
             self._publish_status()
 
     def _supply(self, now: float) -> None:
-        """Send again what others lack, and answer who has asked."""
+        """Send again what others lack, answer who has asked, and ask for what is lacking here."""
         found = [m for run in self._past.values() for m in run.found]
         found += [*self._comparisons.orphans, *self._outbox.found]
         missing = self._needs.missing(self._state_published, found, now, self._past)
@@ -250,6 +251,8 @@ class AgentRun:
         for message in missing.alignments:
             self._outbox.send_alignments(message)
         self._outbox.answer(self._published)
+        for state in self._comparisons.to_ask_for(now):
+            request_map(self._session, self._team, state, self._inbox.add)
 
     def _compare(self, now: float) -> None:
         """Publish the outcome of the comparison under way, if there is one; begin the next."""
@@ -280,6 +283,7 @@ class AgentRun:
             found,
         )
         self._outbox.send_alignments(message)
+        self._whereabouts.met(message)
         self._state.keep_found(self._mapper.boot, self._outbox.found)
         return found
 

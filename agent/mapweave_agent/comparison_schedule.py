@@ -10,6 +10,7 @@ from mapweave.maps import Alignment, RobotMap
 from mapweave.team.hysteresis import joins
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.team_maps import JoinedRuns, TeamMaps
+from mapweave_protocol.link.lacking import Lacking
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     Compared,
@@ -75,6 +76,8 @@ class ComparisonSchedule:
         self._earlier: dict[str, RobotMap] = {}  # this robot's runs before, by boot
         self._team = TeamMaps()
         self._joined = JoinedRuns()
+        self._wanted: list[MapVersion] = []
+        self._lacking = Lacking()
         self._pairs: dict[PairOfRuns, _Pair] = {}
         self._quiet_until = -math.inf
 
@@ -113,9 +116,21 @@ class ComparisonSchedule:
     def coordinator(self, status: JointStatusMessage) -> None:
         """Take in which pairs' alignments a coordinator holds, and which runs it has joined."""
         self._joined.take(status)
+        others = [state for state in status.maps if run_of(state) not in self._own_runs]
+        for state in others:
+            self._team.note_map_of(state.robot)
+        self._wanted = [state for state in others if self._team.is_gone(state.robot)]
         for ends in status.alignments:
             self._note_compared(ends)
         self._wake()
+
+    def to_ask_for(self, now: float) -> list[MapVersion]:
+        """Return which maps to ask a coordinator for at `now` [s]: their robots are gone."""
+        return [
+            state
+            for state in self._wanted
+            if self._lacking.due(str(run_of(state)), state, now, lacks=not self._team.holds(state))
+        ]
 
     def learned(self, message: AlignmentMessage) -> None:
         """Take in what another found out about a pair: we need not do it again."""

@@ -128,6 +128,7 @@ class Dispatcher:
         count = self._coordinators.take(boot, here=here)
         if count:
             _log.warning(tell_coordinators(count))
+        self._whereabouts.coordinator_here(boot, here=here)
         if not here:
             self._needs.coordinator_gone(boot)
 
@@ -157,3 +158,4 @@ class Dispatcher:
         message = self._alignments.read(arrival)
         if message is not None and message.robot != self._robot:
             self._plan.learned(message)
+            self._whereabouts.met(message)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from mapweave.maps import RobotMap, component_name
-from mapweave_protocol.wire.messages import JointStatusMessage
+from mapweave_protocol.wire.messages import JointStatusMessage, MapVersion
 from mapweave_protocol.wire.pairs import is_earlier_run, name_with_boot, run_of
 
 MAX_RUNS = 64  # of one robot
@@ -74,6 +74,16 @@ class TeamMaps:
         named = self._robot(robot)
         named.boots.discard(boot)
         named.gone = not named.boots
+
+    def note_map_of(self, robot: str) -> None:
+        """Note that a coordinator holds a map of a robot: one that is not here has gone."""
+        named = self._robot(robot)
+        named.gone = not named.boots
+
+    def holds(self, state: MapVersion) -> bool:
+        """Tell whether a map is here, in this state or a newer one."""
+        robot_map = self._robot(state.robot).maps.get(state.boot)
+        return robot_map is not None and robot_map.version >= state.version
 
     def is_gone(self, robot: str) -> bool:
         """Tell whether a robot was here and is no longer."""

@@ -70,6 +70,7 @@ class Relay:
         trace: TracebackType | None,
     ) -> None:
         self.sever()
+        self._run(self._end()).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
@@ -98,6 +99,12 @@ class Relay:
             writer.transport.abort()
         # Who serves them sees that they are gone.
         await asyncio.sleep(0)
+
+    async def _end(self) -> None:
+        serving = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in serving:
+            task.cancel()
+        await asyncio.gather(*serving, return_exceptions=True)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:

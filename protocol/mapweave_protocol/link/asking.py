@@ -7,9 +7,10 @@ from typing import TypeVar
 import zenoh
 
 from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY
-from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
+from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY, MAP
+from mapweave_protocol.wire.messages import JointMapMessage, MapMessage, MapVersion
 from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.queries import JointQuery
 
@@ -85,6 +86,31 @@ def request_all_of(
         take,
         consolidation=zenoh.ConsolidationMode.NONE,
         accept_replies=zenoh.ReplyKeyExpr.ANY,
+        timeout=ANSWER_WITHIN,
+    )
+
+
+def request_map(
+    session: zenoh.Session, team: str, state: MapVersion, take: Callable[[Arrival], None]
+) -> None:
+    """Ask the coordinator for the map of a run; it comes as if its robot had published it.
+
+    Parameters
+    ----------
+    take
+        Called in a thread of Zenoh's.
+    """
+    key = MAP.build(team=team, robot=state.robot)
+    query = JointQuery(robot=state.robot, boot=state.boot)
+
+    def take_reply(reply: zenoh.Reply) -> None:
+        if reply.ok:
+            take(Arrival(key, reply.ok.payload.to_bytes()))
+
+    session.get(
+        f"{JOINT_QUERY.build(team=team)}?{query.parameters}",
+        take_reply,
+        consolidation=zenoh.ConsolidationMode.NONE,
         timeout=ANSWER_WITHIN,
     )
 
