@@ -141,7 +141,7 @@ class Dispatcher:
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)
-        if message is not None and (message.robot, message.boot) != (self._robot, self._boot):
+        if message is not None:
             robot_map = self._assembler.update(message)
             if robot_map is not None:
                 self._plan.peer_map(robot_map)

@@ -190,14 +190,6 @@ class Store:
         except UnwritableError as error:
             _log.warning("%s; what was found before stays", error)
 
-    def renew_alignments(self, pair: tuple[str, str], message: bytes) -> None:
-        """Keep `message` in place of the last one of its pair, of which it says the same."""
-        self._rows(
-            "UPDATE alignment SET message = ? WHERE id ="
-            " (SELECT max(id) FROM alignment WHERE first = ? AND second = ?)",
-            message, *sorted(pair),
-        )  # fmt: skip
-
     def last_alignments(self) -> list[bytes]:
         """Return the last message of every pair of runs, as far as it can be read."""
         numbers = self._database.rows(

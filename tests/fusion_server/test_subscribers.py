@@ -86,7 +86,6 @@ def test_versions_made_in_an_outage_of_a_subscriber_arrive_after_it_though_nothi
             assert watcher.next().version == version
         relay.restore()
         assert [joint.version for joint in islice(subscriber, 28)] == list(range(2, 30))
-        subscriber.close()
 
 
 def test_maps_and_alignments_of_a_robot_that_came_and_went_in_an_outage_arrive_after_it(
@@ -111,8 +110,6 @@ def test_maps_and_alignments_of_a_robot_that_came_and_went_in_an_outage_arrive_a
         relay.restore()
         assert next(maps).robot == "a"
         assert states(next(pairs)) == states(later)
-    maps.close()
-    pairs.close()
 
 
 def of_version(message: AlignmentMessage, version: int) -> AlignmentMessage:
@@ -141,8 +138,6 @@ def test_who_comes_when_the_robots_are_gone_gets_their_maps_and_what_they_found(
     assert [(m.robot, m.version) for m in islice(maps, 2)] == [("a", 1), ("b", 1)]
     pairs = mapweave_protocol.alignments(network.team, **at(network))
     assert states(next(pairs)) == (MapVersion.of(map_a), MapVersion.of(map_b)) == states(alignments)
-    maps.close()
-    pairs.close()
 
 
 @pytest.mark.usefixtures("finished_team")
@@ -180,8 +175,6 @@ def test_against_a_long_history_the_latest_comes_first_and_all_come_to_who_asks(
         a.publish_map(make_map("a"))
         assert [joint.version for joint in islice(every, HISTORY + 1)] == [*range(1, HISTORY + 2)]
         assert next(early).version == next(late).version == HISTORY + 1
-    for subscriber in (early, late, every):
-        subscriber.close()
 
 
 def test_a_subscriber_that_was_asleep_longer_than_its_lease_gets_every_version_in_order(
@@ -235,7 +228,6 @@ def test_of_two_coordinators_both_hold_all_and_a_subscriber_follows_one_until_it
         other = next(subscriber)
         while not joined(other):  # its own series, from the beginning
             other = next(subscriber)
-    subscriber.close()
     assert other.version <= 3
 
 

@@ -48,7 +48,8 @@ class JointSequence:
             return JointQuery()
         if self._newest <= (self._last or 0):
             return None
-        if self._last is None or self._tries == MAX_TRIES - 1:
+        unknown = self._last is None or self._series is None
+        if unknown or self._tries == MAX_TRIES - 1:
             return JointQuery()  # is there such a version at all?
         return JointQuery(since=self._last, limit=ASKED_AT_ONCE)
 

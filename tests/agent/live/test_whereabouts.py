@@ -97,10 +97,10 @@ def test_a_component_that_the_joint_map_no_longer_has_is_in_no_joint_frame() -> 
 
 def meeting(decision: Decision = "accepted") -> AlignmentMessage:
     """Return how r2/0 lies to r1/0, which r1 has found."""
-    ends = [MapVersion(robot=robot, boot="b", version=1) for robot in ("r1", "r2")]
+    first, second = (MapVersion(robot=robot, boot="b", version=1) for robot in ("r1", "r2"))
     turned = np.array([10.0, 5.0, np.pi / 2])
     found = Alignment("r1/0", "r2/0", turned, decision, 0.9, Reason.words("so"))
-    return AlignmentMessage.pack("r1", *ends, [found])
+    return AlignmentMessage.pack("r1", first, second, [found])
 
 
 def frame_of(whereabouts: Whereabouts) -> tuple[str, int, tuple[float, ...]] | None:

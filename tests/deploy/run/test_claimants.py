@@ -1,6 +1,7 @@
 """Processes that claim one name: said by all who see it, and neither's work is lost."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import mapweave_protocol
@@ -31,8 +32,8 @@ def test_two_machines_with_one_id_are_both_in_the_joint_map_under_the_names_of_t
         start_agent(others, elsewhere, namesake)
         watched = crew.start("watch", 2, ["watch", *plan.connection])
         for folder in (tmp_path, tmp_path / "other"):
-            until(lambda folder=folder: says(folder, "agent-r1", "finished:"))
-            until(lambda folder=folder: says(folder, "agent-r1", "2 agents call themselves r1"))
+            until(partial(says, folder, "agent-r1", "finished:"))
+            until(partial(says, folder, "agent-r1", "2 agents call themselves r1"))
         start_server(crew, plan, plan.store)
         until(lambda: says(tmp_path, "server", "2 agents call themselves r1"))
         until(lambda: "2 agents call themselves r1" in watched.log.read_text())
@@ -69,7 +70,7 @@ def test_two_coordinators_are_told_by_all_who_see_them_and_each_holds_everything
         start_server(others, plan, tmp_path / "other.sqlite")
         warning = "2 coordinators of the team are here"
         for name in ("server", "agent-r1", "agent-r2"):
-            until(lambda name=name: says(tmp_path, name, warning))
+            until(partial(says, tmp_path, name, warning))
         until(lambda: says(tmp_path / "other", "server", warning))
         until(lambda: warning in watched.log.read_text())
         # What the robots found before the second one was there reaches it all the same.

@@ -4,6 +4,7 @@ import signal
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -42,7 +43,7 @@ def test_a_coordinator_started_after_the_robots_ended_gets_all_when_they_start_a
             start_agent(crew, plan, robot)
         until(lambda: any(path.stat().st_size > 100 for path in plan.states.glob("*/*.found")))
         for robot in (r1, r2):
-            until(lambda robot=robot: says(tmp_path, f"agent-{robot.robot}", "finished:"))
+            until(partial(says, tmp_path, f"agent-{robot.robot}", "finished:"))
             end(crew, child(crew, f"agent {robot.robot}"))
         start_server(crew, plan, tmp_path / "empty.sqlite")
         for robot in (r1, r2):  # each sees too little now to be joined to anything

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,10 @@ def halves(tmp_path: Path) -> Iterator[Halves]:
             yield Halves(here, there, crew, others, link)
 
 
+def are_joined(plan: Plan) -> bool:
+    return joined_names(plan) == {"r1/0", "r2/0"}
+
+
 def test_two_halves_with_a_coordinator_each_are_one_joint_map_after_the_link_returns(
     halves: Halves, tmp_path: Path
 ) -> None:
@@ -64,9 +69,9 @@ def test_two_halves_with_a_coordinator_each_are_one_joint_map_after_the_link_ret
     until(lambda: joined_names(halves.there) == {"r2/0"})
     halves.link.restore()
     for plan in (halves.here, halves.there):
-        until(lambda plan=plan: joined_names(plan) == {"r1/0", "r2/0"})
+        until(partial(are_joined, plan))
     for folder in (here, there):
-        until(lambda folder=folder: says(folder, "server", "2 coordinators of the team are here"))
+        until(partial(says, folder, "server", "2 coordinators of the team are here"))
 
 
 def test_robots_cut_off_from_the_coordinator_go_on_comparing_and_are_in_one_frame(
@@ -88,7 +93,7 @@ def test_robots_cut_off_from_the_coordinator_go_on_comparing_and_are_in_one_fram
             break
     assert frames == {"r1": "r1/0", "r2": "r1/0"}
     for robot in team:
-        until(lambda robot=robot: says(there, f"agent-{robot.robot}", "finished:"))
+        until(partial(says, there, f"agent-{robot.robot}", "finished:"))
     assert joined_names(halves.here) is None
     halves.link.restore()
     until(lambda: joined_names(halves.here) == {"r1/0", "r2/0"})
