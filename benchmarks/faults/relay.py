@@ -46,6 +46,8 @@ class Relay:
         self._loss = loss
         self._random = random.Random(seed)
         self._writers: set[asyncio.StreamWriter] = set()
+        self._passing = asyncio.Event()
+        self._passing.set()
         self._server: asyncio.Server | None = None
         self._port = 0
         self._loop = asyncio.new_event_loop()
@@ -79,14 +81,25 @@ class Relay:
         """Cut all connections; new ones are refused until `restore`."""
         self._run(self._sever()).result()
 
+    def silence(self) -> None:
+        """Pass on nothing until `restore`, but cut no connection: their ends find out."""
+        self._run(self._silence()).result()
+
     def restore(self) -> None:
-        """Let clients connect, at the same endpoint as before."""
+        """Let clients connect, at the same endpoint as before, and pass on what was held back."""
         self._run(self._restore()).result()
 
     def _run(self, coroutine: Coroutine[Any, Any, None]) -> Future[None]:
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop)
 
+    async def _silence(self) -> None:
+        self._passing.clear()
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+
     async def _restore(self) -> None:
+        self._passing.set()
         if self._server is None:
             self._server = await asyncio.start_server(self._serve, "127.0.0.1", self._port)
             self._port = self._server.sockets[0].getsockname()[1]
@@ -155,5 +168,6 @@ class Relay:
         while True:
             due, data = await waiting.get()
             await asyncio.sleep(max(0.0, due - self._loop.time()))
+            await self._passing.wait()
             writer.write(data)
             await writer.drain()
