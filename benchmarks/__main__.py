@@ -23,7 +23,7 @@ from benchmarks import (
     team,
     wire,
 )
-from benchmarks.faults import outages
+from benchmarks.faults import kills, outages
 from benchmarks.speed import command as speed
 
 
@@ -55,6 +55,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "confidence": fit_confidence,
     "wire": wire,
     "outages": outages,
+    "kills": kills,
     "page": page,
     "mutations": mutations,
 }

@@ -38,6 +38,8 @@ from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.pairs import Run, name_with_boot, run_of
 
 M = TypeVar("M", bound=Message)
+ASKED_AFTER = 4.0  # [s] that a robot is given to see itself that its map is lacking
+
 _log = logging.getLogger(__name__)
 
 
@@ -77,7 +79,7 @@ class Intake:
         self._statuses = status_reader()
         self._heard: dict[Run, StatusMessage] = {}
         self._last_heard: dict[str, float] = {}
-        self._lacking = Lacking()
+        self._lacking = Lacking(ASKED_AFTER)
         self._assembler = MapAssembler()
         self._packers: defaultdict[Run, MapSender] = defaultdict(MapSender)
         self._clashing: set[str] = set()

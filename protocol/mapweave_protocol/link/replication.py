@@ -98,8 +98,10 @@ def replicated_maps(
             for state in _maps_there_are(said, held):
                 if held.lacks(run_of(state), states_of([state])):
                     query = JointQuery(robot=state.robot, boot=state.boot)
-                    asked += _ask(session, team, query, MapMessage)
-                    request_all_of(session, team, state.robot, inbox.put)
+                    answers = _ask(session, team, query, MapMessage)
+                    asked += answers
+                    if not any(answer.version >= state.version for answer in answers):
+                        request_all_of(session, team, state.robot, inbox.put)
 
 
 def replicated_alignments(
