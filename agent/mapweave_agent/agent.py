@@ -4,18 +4,22 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import zenoh
 
+from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import Alignment, RobotMap
 from mapweave.scan.scan import Scan
-from mapweave.team.hysteresis import keep_joined
+from mapweave_agent.by_hand.kept_orders import KeptOrders
+from mapweave_agent.by_hand.own_marks import Frame, OwnMarks
+from mapweave_agent.comparing.outcomes import found_in, message_of
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
-from mapweave_agent.dispatch import Dispatcher, listening
+from mapweave_agent.dispatch import Dispatcher
+from mapweave_agent.listening import listening
+from mapweave_agent.live.attending import attending
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -24,9 +28,9 @@ from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
-from mapweave_protocol.link.asking import request_map
+from mapweave_protocol.link.asking import request_map, request_orders_of_coordinator
 from mapweave_protocol.link.inbox import Inbox
-from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, PoseMessage, StatusMessage
+from mapweave_protocol.wire.messages import MapVersion, PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
 LIVE_POLL = 0.05  # [s] after which it is noticed that no scans come, or nothing arrives
@@ -92,8 +96,15 @@ class AgentRun:
             self._comparisons.earlier_map(run.map)
         self._needs = Needs(mapper.robot)
         self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
+        self._marks = OwnMarks(mapper.robot, mapper.boot)
+        self._orders = KeptOrders(state)
         self._reception = Dispatcher(
-            mapper.robot, mapper.boot, self._comparisons, self._needs, self._whereabouts
+            mapper.robot,
+            mapper.boot,
+            self._comparisons,
+            self._needs,
+            self._whereabouts,
+            self._orders,
         )
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
         self._inbox = Inbox()
@@ -110,6 +121,16 @@ class AgentRun:
     def finished(self) -> bool:
         """Whether all scans are mapped, and the last map is published."""
         return self._finished
+
+    def mark(self, label: str, place: FloatArray, frame: Frame) -> str:
+        """Mark a (2,) `place` [m] from any thread; as of `OwnMarks.add`."""
+        with self._mapping:
+            snapshot = self._mapper.snapshot()
+        return self._marks.add(snapshot.submaps, label, place, frame, time.time())
+
+    def take_back_mark(self, identity: str) -> None:
+        """Take a mark back; as of `OwnMarks.remove`."""
+        self._marks.remove(identity)
 
     def run(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         """Map all `scans` of a recording, then compare with the peers until `stopping`.
@@ -133,7 +154,7 @@ class AgentRun:
         """
         self._live = scans
         with self._in_the_team():
-            with self._attending() as failed:
+            with attending(lambda: self._attend(LIVE_POLL)) as failed:
                 while not (stopping() or scans.ended or failed()):
                     scan = scans.take(LIVE_POLL)
                     if scan is not None:
@@ -141,26 +162,9 @@ class AgentRun:
             self._compare_until(stopping)
 
     @contextmanager
-    def _attending(self) -> Iterator[Callable[[], bool]]:
-        """Do all but mapping in a thread of its own; give a block what tells that it failed."""
-        over = threading.Event()
-
-        def attend() -> None:
-            while not over.is_set():
-                self._attend(LIVE_POLL)
-
-        with ThreadPoolExecutor(1, thread_name_prefix="attending") as thread:
-            attended = thread.submit(attend)
-            try:
-                yield attended.done
-            finally:
-                over.set()
-            attended.result()
-
-    @contextmanager
     def _in_the_team(self) -> Iterator[None]:
-        listened = listening(self._session, self._team, self._mapper.robot, self._inbox.put)
-        with self._outbox, listened:
+        robot, put = self._mapper.robot, self._inbox.put
+        with self._outbox, listening(self._session, self._team, robot, put):
             _log.info("%s joins team %s", self._mapper.robot, self._team)
             yield
             if self._reception.refused:
@@ -230,6 +234,8 @@ class AgentRun:
             self._reception.take(arrival)
             timeout = 0.0
         now = time.monotonic()
+        if self._marks.is_news:
+            self._publish_marks()
         if self._changed and not self._finished and self._publication.due(now):
             self._publish_map(complete=False)
         if self._unkept and not self._finished and self._keeping.due(now):
@@ -243,14 +249,20 @@ class AgentRun:
         """Send again what others lack, answer who has asked, and ask for what is lacking here."""
         found = [m for run in self._past.values() for m in run.found]
         found += [*self._comparisons.orphans, *self._outbox.found]
-        missing = self._needs.missing(self._state_published, found, now, self._past)
+        marked = {run.marks_state: run.marks for run in self._past.values()}
+        marks = [s for s in (self._marks.state, *marked) if s is not None]
+        missing = self._needs.missing(self._state_published, found, now, self._past, marks)
         if missing.map:
             self._outbox.send_map(self._published, complete=True)
         for run in missing.past:
             self._outbox.send_past(self._past[run])
         for message in missing.alignments:
             self._outbox.send_alignments(message)
-        self._outbox.answer(self._published)
+        for run in missing.marks:
+            self._outbox.send_marks(marked.get(run) or self._marks.message())
+        if self._orders.lacks(now):
+            request_orders_of_coordinator(self._session, self._team, self._inbox.put)
+        self._outbox.answer(self._published, self._orders.message)
         for state in self._comparisons.to_ask_for(now):
             request_map(self._session, self._team, state, self._inbox.add)
 
@@ -268,20 +280,11 @@ class AgentRun:
 
     def _publish_outcome(self, outcome: ComparisonOutcome) -> Sequence[Alignment]:
         """Return what was published: nothing where comparing failed."""
-        comparison = outcome.comparison
-        if outcome.alignments is None:
-            # What was found out about earlier versions of the pair stands.
-            _log.error("comparing with %s failed: %s", comparison.peer, outcome.failure)
+        have_met = self._comparisons.have_met(outcome.comparison)
+        found = found_in(outcome, have_met=have_met)
+        if found is None:
             return ()
-        found = outcome.alignments
-        if self._comparisons.have_met(comparison):
-            found = keep_joined(found)
-        message = AlignmentMessage.pack(
-            self._mapper.robot,
-            MapVersion.of(comparison.reference),
-            MapVersion.of(comparison.other),
-            found,
-        )
+        message = message_of(self._mapper.robot, outcome.comparison, found)
         self._outbox.send_alignments(message)
         self._whereabouts.met(message)
         self._state.keep_found(self._mapper.boot, self._outbox.found)
@@ -290,10 +293,11 @@ class AgentRun:
     def _publish_map(self, *, complete: bool) -> None:
         self._changed = False
         self._published = self._draw()
-        self._outbox.send_map(self._published, complete=complete)
+        arrives = self._outbox.send_map(self._published, complete=complete)
         self._tell(self._published)
         self._keep(self._published)
-        self._comparisons.own_map(self._published, finished=self._finished)
+        # Peers compare what has arrived: so do we, that it is decided alike on both ends.
+        self._comparisons.own_map(arrives, finished=self._finished)
         self._publication.published(time.monotonic())
 
     def _draw(self) -> RobotMap:
@@ -312,6 +316,11 @@ class AgentRun:
         """Which state of the map was published last, None while there is nothing in it."""
         return MapVersion.of(self._published) if self._published.submaps else None
 
+    def _publish_marks(self) -> None:
+        message = self._marks.message()
+        self._outbox.send_marks(message)
+        self._state.keep_marks(message)
+
     def _publish_status(self) -> None:
         status = StatusMessage(
             robot=self._mapper.robot,
@@ -329,6 +338,7 @@ class AgentRun:
             compared=dict(self._comparisons.published),
             holds=self._comparisons.held,
             sent=dict(self._outbox.sent),
+            orders=self._orders.digest,
         )
         self._outbox.send_status(status)
         self._status_due = time.monotonic() + self._parameters.status_interval

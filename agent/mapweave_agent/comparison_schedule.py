@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 from mapweave.maps import Alignment, RobotMap
 from mapweave.team.hysteresis import joins
+from mapweave_agent.comparing.team_maps import JoinedRuns, TeamMaps
 from mapweave_agent.publication_schedule import AgentParameters
-from mapweave_agent.team_maps import JoinedRuns, TeamMaps
 from mapweave_protocol.link.lacking import Lacking
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,

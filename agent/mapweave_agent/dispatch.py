@@ -1,15 +1,12 @@
 """What a robot hears of its team, handed on to its plan of comparisons."""
 
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 
-import zenoh
-
+from mapweave_agent.by_hand.kept_orders import KeptOrders
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
-from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
+from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.link.inbox import (
     Arrival,
@@ -21,36 +18,8 @@ from mapweave_protocol.link.inbox import (
     read_presence,
     status_reader,
 )
-from mapweave_protocol.link.session import OnSample, declare_subscriber
-from mapweave_protocol.wire.keys import (
-    ALIGNMENT,
-    COORDINATOR_LIVE,
-    JOINT_STATUS,
-    LIVE,
-    MAP,
-    STATUS,
-)
 
 _log = logging.getLogger(__name__)
-
-
-@contextmanager
-def listening(session: zenoh.Session, team: str, robot: str, put: OnSample) -> Iterator[None]:
-    """Subscribe to the presence of a robot's team, then to what concerns the robot."""
-    live, maps = LIVE.pattern(team=team), MAP.pattern(team=team)
-    coordinators = COORDINATOR_LIVE.pattern(team=team)
-    as_reference = ALIGNMENT.pattern(team=team, reference=robot)
-    as_other = ALIGNMENT.pattern(team=team, other=robot)
-    with (
-        session.liveliness().declare_subscriber(live, put, history=True),
-        session.liveliness().declare_subscriber(coordinators, put, history=True),
-        declare_subscriber(session, as_reference, put),
-        declare_subscriber(session, as_other, put),
-        declare_subscriber(session, maps, put, history=MESSAGES_TO_COMPLETE),
-        session.declare_subscriber(STATUS.pattern(team=team), put),
-        session.declare_subscriber(JOINT_STATUS.build(team=team), put),
-    ):
-        yield
 
 
 class Dispatcher:
@@ -66,6 +35,8 @@ class Dispatcher:
         Told what others hold.
     whereabouts
         Told which frames the joint map has.
+    orders
+        Told what operators order.
     """
 
     def __init__(
@@ -75,12 +46,14 @@ class Dispatcher:
         plan: ComparisonSchedule,
         needs: Needs,
         whereabouts: Whereabouts,
+        orders: KeptOrders,
     ) -> None:
         self._robot = robot
         self._boot = boot
         self._plan = plan
         self._needs = needs
         self._whereabouts = whereabouts
+        self._orders = orders
         self._maps = map_reader()
         self._statuses = status_reader()
         self._alignments = alignment_reader()
@@ -94,7 +67,7 @@ class Dispatcher:
     def refused(self) -> int:
         """How many messages were not what they should be."""
         readers = self._maps, self._statuses, self._alignments, self._joint_statuses
-        return sum(reader.refused for reader in readers)
+        return sum(reader.refused for reader in readers) + self._orders.refused
 
     def take(self, arrival: Arrival) -> None:
         """Take in what arrived."""
@@ -111,6 +84,8 @@ class Dispatcher:
             self._take_alignment(arrival)
         elif self._joint_statuses.reads(arrival):
             self._take_joint_status(arrival)
+        else:
+            self._orders.takes(arrival)
 
     def _take_presence(self, presence: Presence) -> None:
         if presence.robot == self._robot:
@@ -138,6 +113,7 @@ class Dispatcher:
             self._needs.coordinator(status)
             self._plan.coordinator(status)
             self._whereabouts.coordinator(status)
+            self._orders.coordinator(status)
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)

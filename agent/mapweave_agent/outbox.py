@@ -15,16 +15,26 @@ from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import (
     declare_alignment_publisher,
     declare_map_publisher,
+    declare_marks_publisher,
     declare_pose_publisher,
     declare_status_publisher,
 )
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, POSE, STATUS
-from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage, StatusMessage, Traffic
+from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, MARK, POSE, STATUS
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    MarksMessage,
+    OrdersMessage,
+    PoseMessage,
+    StatusMessage,
+    Traffic,
+)
 from mapweave_protocol.wire.pairs import Run, states_of
+from mapweave_protocol.wire.queries import JointQuery
 
 WAITING_QUERIES = 16
-KINDS = "map", "alignment", "pose", "status"
+KINDS = "map", "alignment", "pose", "mark", "status"
+ORDERS = JointQuery(orders="all").parameters
 
 _log = logging.getLogger(__name__)
 
@@ -46,6 +56,7 @@ class Outbox:
         self._sender = MapSender()
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[frozenset[Run], AlignmentMessage] = {}
+        self._marked: dict[str, MarksMessage] = {}
         self._messages = Counter(dict.fromkeys(KINDS, 0))
         self._bytes = Counter(dict.fromkeys(KINDS, 0))
         self._declared = ExitStack()
@@ -58,6 +69,8 @@ class Outbox:
             status_key = STATUS.build(team=self._team, robot=self._robot)
             live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
             self._maps = keep(declare_map_publisher(self._session, map_key))
+            marks_key = MARK.build(team=self._team, robot=self._robot)
+            self._marks = keep(declare_marks_publisher(self._session, marks_key))
             pose_key = POSE.build(team=self._team, robot=self._robot)
             self._poses = keep(declare_pose_publisher(self._session, pose_key))
             self._statuses = keep(declare_status_publisher(self._session, status_key))
@@ -91,13 +104,19 @@ class Outbox:
         """What was published last of each pair of runs."""
         return self._found.values()
 
-    def send_map(self, robot_map: RobotMap, *, complete: bool) -> None:
-        """Publish a version of the map, or all of it if `complete`."""
+    def send_map(self, robot_map: RobotMap, *, complete: bool) -> RobotMap:
+        """Publish a version of the map, or all of it if `complete`; return it as it arrives."""
         self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
+        return self._sender.as_sent(robot_map)
 
     def send_past(self, run: PastRun) -> None:
         """Publish the map of an earlier run."""
         self._put("map", self._maps, run.payload)
+
+    def send_marks(self, message: MarksMessage) -> None:
+        """Publish the marks of a run of the robot, all of them."""
+        self._marked[message.boot] = message
+        self._put("mark", self._marks, encode(message))
 
     def send_alignments(self, message: AlignmentMessage) -> None:
         """Publish what was found out about a pair of robots."""
@@ -117,18 +136,26 @@ class Outbox:
         """Publish where the robot is."""
         self._put("pose", self._poses, encode(message))
 
-    def answer(self, robot_map: RobotMap) -> None:
-        """Give who has asked the whole of `robot_map`, as published last, and what was found."""
+    def answer(self, robot_map: RobotMap, orders: OrdersMessage) -> None:
+        """Give who has asked the whole of `robot_map`, as published last, and what was found.
+
+        Or, who has asked for that, the `orders` of operators.
+        """
         while (query := self._asked.handler.try_recv()) is not None:
             with query:
-                self._answer(query, robot_map)
+                self._answer(query, robot_map, orders)
 
-    def _answer(self, query: zenoh.Query, robot_map: RobotMap) -> None:
+    def _answer(self, query: zenoh.Query, robot_map: RobotMap, orders: OrdersMessage) -> None:
+        parts = {"team": self._team, "robot": self._robot}
         try:
-            map_key = MAP.build(team=self._team, robot=self._robot)
-            query.reply(map_key, self._sender.payload(robot_map, complete=True))
+            if str(query.parameters) == ORDERS:
+                query.reply(AGENT_QUERY.build(**parts), encode(orders))
+                return
+            query.reply(MAP.build(**parts), self._sender.payload(robot_map, complete=True))
             for message in self._found.values():
                 query.reply(self._key_of(message), encode(message))
+            for marks in self._marked.values():
+                query.reply(MARK.build(**parts), encode(marks))
         except zenoh.ZError as error:
             _log.warning("an answer could not be sent: %s", error)
 

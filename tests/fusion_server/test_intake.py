@@ -13,10 +13,11 @@ from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.keys import MAP, STATUS
 from mapweave_protocol.wire.messages import StatusMessage
 
-SEGMENTS = 180_000  # of random numbers: four submaps fit into a message, eight do not
+SEGMENTS = 100
 
 
 def _submap(number: int) -> Submap:
@@ -29,8 +30,9 @@ def _submap(number: int) -> Submap:
 
 
 def test_a_map_that_is_too_large_as_a_whole_is_logged_once_and_dropped(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(entropy, "MAX_NUMBERS", 4 * 9 * SEGMENTS)  # 5 to 8 of each segment
     submaps = tuple(_submap(number) for number in range(8))
     sender, key = MapSender(), MAP.build(team="t", robot="a")
     with Store(tmp_path / "store.sqlite", "t") as store:
@@ -73,7 +75,7 @@ def test_a_robot_whose_map_has_not_come_is_asked_for_it(
         intake = Intake(Coordinator(CoordinatorParameters()), store, Story())
         intake.take(Arrival(MAP.build(team="t", robot="a"), MapSender().payload(held)), 0.0)
         intake.take(status, 0.0)
-        assert intake.robots_to_ask(0.0) == []  # it may be on its way
+        assert intake.robots_to_ask(0.0) == ([], [])  # it may be on its way
         intake.take(status, 0.0)
-        assert intake.robots_to_ask(ASKED_AFTER) == asked
-        assert intake.robots_to_ask(10 * ASKED_AFTER) == []  # nothing was heard since
+        assert intake.robots_to_ask(ASKED_AFTER) == (asked, [])
+        assert intake.robots_to_ask(10 * ASKED_AFTER) == ([], [])  # nothing was heard since

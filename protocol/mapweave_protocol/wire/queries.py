@@ -2,9 +2,10 @@
 
 Replies, one sample each, on the same key: to none and ``version=N`` a `JointMapMessage`, to
 ``since=N`` one for every version after N in their order (the first K with ``limit=K``), to
-``robot=ID`` a complete `MapMessage` of that robot's last run (of another with ``boot=BOOT``), to
-``of=maps`` those of all runs, to ``of=alignments`` an `AlignmentMessage` for each pair of runs;
-with ``since=N`` only what came after version N was begun.
+``robot=ID`` and ``component=ID/K`` a complete `MapMessage` (of the robot's last run, or of that
+with ``boot=BOOT``), to ``of=maps`` those of all runs, to ``of=alignments`` an `AlignmentMessage` of
+each pair of runs, with ``since=N`` only what is not in version N; to ``runs=all`` a `RunsMessage`,
+to ``orders=all`` an `OrdersMessage`, which agents give as well.
 """
 
 import re
@@ -13,10 +14,15 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.wire.model import Count, Id
+from mapweave_protocol.wire.model import ComponentName, Count, Id
 
 _NUMBER = re.compile(r"[0-9]{1,15}")
-_NUMBERS = "version", "since", "limit"
+_COUNTED = {"version", "since", "limit"}
+_EXPECTED = (
+    "version=N, since=N, since=N;limit=K, robot=ID, robot=ID;boot=BOOT, component=ID/K, of=maps,"
+    " of=alignments, since=N;of=maps, since=N;of=alignments, runs=all, orders=all"
+)
+_BESIDE = {"limit": "since", "boot": "robot"}  # what refines another question
 
 
 class JointQuery(BaseModel):
@@ -36,6 +42,12 @@ class JointQuery(BaseModel):
         Of which run of it.
     of
         All of these instead of joint maps.
+    component
+        The map of the run that this component is, or was, of.
+    runs
+        Which runs there are, of all robots.
+    orders
+        All orders of operators.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -46,17 +58,18 @@ class JointQuery(BaseModel):
     robot: Id | None = Field(default=None)
     boot: Id | None = Field(default=None)
     of: Literal["maps", "alignments"] | None = Field(default=None)
+    component: ComponentName | None = Field(default=None)
+    runs: Literal["all"] | None = Field(default=None)
+    orders: Literal["all"] | None = Field(default=None)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         given = self._given().keys()
-        if len(given & {"version", "since", "robot"}) > 1 or given >= {"of", "robot"}:
-            raise ValueError("expected one of version, since, robot and of")
-        for name, beside in (("limit", "since"), ("boot", "robot")):
-            if name in given and beside not in given:
-                raise ValueError(f"{name}, expected beside {beside} only")
-        if "of" in given and not given <= {"of", "since"}:
-            raise ValueError("of, expected alone or beside since")
+        if len(given - _BESIDE.keys()) > 1 and given != {"since", "of"}:
+            raise ValueError("expected one question")
+        for name, other in _BESIDE.items():
+            if name in given and other not in given:
+                raise ValueError(f"{name}, expected beside {other} only")
         return self
 
     @property
@@ -75,16 +88,13 @@ class JointQuery(BaseModel):
         """
         pairs = [part.partition("=") for part in parameters.split(";") if part]
         values: dict[str, int | str] = {
-            name: int(value) if name in _NUMBERS and _NUMBER.fullmatch(value) else value
+            name: int(value) if name in _COUNTED and _NUMBER.fullmatch(value) else value
             for name, _, value in pairs
         }
         try:
             return cls.model_validate(values)
         except ValueError as error:
-            expected = (
-                "expected one of version=N, since=N, since=N;limit=K, robot=ID, robot=ID;boot=BOOT,"
-                " of=maps, of=alignments, since=N;of=maps, since=N;of=alignments, or nothing"
-            )
+            expected = f"expected one of {_EXPECTED}, or nothing"
             raise MessageError("query", f"{parameters[:80]!r}: {expected}") from error
 
     def _given(self) -> dict[str, int | str]:
