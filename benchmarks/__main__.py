@@ -23,7 +23,7 @@ from benchmarks import (
     team,
     wire,
 )
-from benchmarks.faults import kills, outages
+from benchmarks.faults import kills, lossy, outages
 from benchmarks.speed import command as speed
 
 
@@ -56,6 +56,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "wire": wire,
     "outages": outages,
     "kills": kills,
+    "lossy": lossy,
     "page": page,
     "mutations": mutations,
 }
