@@ -20,7 +20,7 @@ from mapweave.errors import FileError
 from mapweave.ids import check_id
 from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save
-from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import STANDARD_INPUT, ScanSource, open_source
 from mapweave.mapping.grids.grid_map import map_of_grid
@@ -54,9 +54,11 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--odometry",
-        choices=["none", "prior"],
+        type=argument(OdometryChoice.parse),
         default="none",
-        help="let the log's odometry help; what was seen decides (%(default)s)",
+        metavar="WHICH",
+        help="let odometry help; what was seen decides: none, prior for that of the log, or a"
+        " bag's topic, such as /odom or /tf (default %(default)s)",
     )
     add_start_arguments(parser)
     parser.add_argument(
@@ -77,14 +79,21 @@ def _run(options: argparse.Namespace) -> int:
     start = Start.of(options)
     if is_grid(Path(options.log)):
         return _run_grid(options, config)
-    step, prior = config.sensor.angular_step, options.odometry == "prior"
-    source = open_source(options.log, ReadOptions(prior, step, options.topic, _warn))
+    source = open_source(options.log, _read_options(options, config))
     mapper = _mapper(options.robot, start, config)
     robot_map, taken = _map_all(options, source, mapper)
     _check_placed(options, _new(robot_map, start), taken)
     _write(options, robot_map)
     print(_summary(_new(robot_map, start), taken))  # noqa: T201
     return 0
+
+
+def _read_options(options: argparse.Namespace, config: Config) -> ReadOptions:
+    odometry: OdometryChoice = options.odometry
+    if odometry.live:
+        raise FileError(options.log, f"has no live odometry; expected {odometry.topic} of a bag")
+    step = config.sensor.angular_step
+    return ReadOptions(odometry.prior, step, options.topic, _warn, odometry_topic=odometry.topic)
 
 
 def _run_grid(options: argparse.Namespace, config: Config) -> int:

@@ -48,6 +48,11 @@ class Mounting:
         return cls(x, y, math.radians(degrees), upside_down)
 
     @property
+    def degrees(self) -> float:
+        """Where its beam of angle 0 looks [°]."""
+        return math.degrees(self.theta)
+
+    @property
     def pose(self) -> FloatArray:
         """(3,) of the laser in the robot's frame [m, m, rad]."""
         return np.array([self.x, self.y, self.theta])
