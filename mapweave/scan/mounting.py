@@ -63,4 +63,6 @@ class Mounting:
             return scan
         angles = -scan.angles if self.upside_down else scan.angles
         # Scan itself puts them in ascending order again.
-        return Scan(scan.ranges, angles + self.theta, scan.index, scan.stamp, scan.odometry)
+        return Scan(
+            scan.ranges, angles + self.theta, scan.index, scan.stamp, scan.odometry, scan.sweep
+        )
