@@ -23,6 +23,7 @@ from mapweave.io.map_files import save
 from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import STANDARD_INPUT, ScanSource, open_source
+from mapweave.mapping.continuation import marks_to_keep
 from mapweave.mapping.grids.grid_map import map_of_grid
 from mapweave.mapping.localization.localizer import Localizer
 from mapweave.mapping.mapper import Mapper
@@ -81,7 +82,7 @@ def _run(options: argparse.Namespace) -> int:
         return _run_grid(options, config)
     source = open_source(options.log, _read_options(options, config))
     mapper = _mapper(options.robot, start, config)
-    robot_map, taken = _map_all(options, source, mapper)
+    robot_map, taken = _map_all(options, source, mapper, start)
     _check_placed(options, _new(robot_map, start), taken)
     _write(options, robot_map)
     print(_summary(_new(robot_map, start), taken))  # noqa: T201
@@ -128,7 +129,7 @@ def _mapper(robot: str | None, start: Start, config: Config) -> ScanMapper:
 
 
 def _map_all(
-    options: argparse.Namespace, source: ScanSource, mapper: ScanMapper
+    options: argparse.Namespace, source: ScanSource, mapper: ScanMapper, start: Start
 ) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
     scans = source.count() if sys.stderr.isatty() else None
@@ -138,7 +139,8 @@ def _map_all(
     for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
         mapper.add(scan)
         taken += 1
-    return mapper.finish(), taken
+    robot_map = mapper.finish()
+    return replace(robot_map, marks=robot_map.marks or marks_to_keep(start.known)), taken
 
 
 def _new(robot_map: RobotMap, start: Start) -> RobotMap:

@@ -1,11 +1,11 @@
 """Maps as MCAP recordings that Foxglove shows; needs `foxglove-sdk`.
 
-Topics: ``/walls``, from red to dark green by confidence, and ``/free_space`` (``SceneUpdate``), an
-entity a component; ``/path/<robot>`` (``PosesInFrame``), the whole path; and ``/tf``
-(``FrameTransforms``), where the sensor was at each scan that has a stamp, so that playing the
-recording drives the robot through its map. Frames are named after components, such as ``a/0``, and
-the sensor's ``a/0/sensor``; components that are not joined share no frame. What is of the map as a
-whole is at the first stamp.
+Topics: ``/walls``, from red to dark green by confidence, ``/free_space`` and ``/marks``
+(``SceneUpdate``), an entity a component; ``/path/<robot>`` (``PosesInFrame``), the whole path;
+and ``/tf`` (``FrameTransforms``), where the sensor was at each scan that has a stamp, so that
+playing the recording drives the robot through its map. Frames are named after components, such as
+``a/0``, and the sensor's ``a/0/sensor``; components that are not joined share no frame. What is of
+the map as a whole is at the first stamp.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,11 +27,12 @@ from mapweave.pictures.scene import Scene, ScenePath, scenes_of
 
 if TYPE_CHECKING:
     from foxglove import Context
-    from foxglove.messages import LinePrimitive, Pose, Quaternion, Timestamp
+    from foxglove.messages import LinePrimitive, Pose, Quaternion, TextPrimitive, Timestamp
 
 SUFFIX = ".mcap"
 LAST_STAMP = 2.0**32 - 1  # [s] that the format's seconds hold
 WALL, OUTLINE = 0.05, 0.01  # [m] thickness of lines
+LETTERS = 0.3  # [m]
 GREY = (0.6, 0.6, 0.6)
 
 
@@ -71,21 +73,20 @@ class _Recording:
         self._drives(paths)
 
     def _lines(self, scenes: Sequence[Scene]) -> None:
+        """Log what is drawn of each scene."""
         from foxglove.channels import SceneUpdateChannel
         from foxglove.messages import SceneEntity, SceneUpdate
 
-        walls = SceneUpdateChannel("/walls", context=self.context)
-        free = SceneUpdateChannel("/free_space", context=self.context)
-        for channel, draw in ((walls, _walls), (free, _free_space)):
-            entities = [
-                SceneEntity(
-                    timestamp=_time(self.start),
-                    frame_id=_frame(scene),
-                    id=scene.name,
-                    lines=draw(scene),
-                )
-                for scene in scenes
-            ]
+        drawn: dict[str, list[SceneEntity]] = {"/walls": [], "/free_space": [], "/marks": []}
+        for scene in scenes:
+            make = partial(
+                SceneEntity, timestamp=_time(self.start), frame_id=_frame(scene), id=scene.name
+            )
+            drawn["/walls"].append(make(lines=_walls(scene)))
+            drawn["/free_space"].append(make(lines=_free_space(scene)))
+            drawn["/marks"].append(make(texts=_marks(scene)))
+        for topic, entities in drawn.items():
+            channel = SceneUpdateChannel(topic, context=self.context)
             channel.log(SceneUpdate(entities=entities), log_time=_nanoseconds(self.start))
 
     def _paths(self, paths: Sequence[tuple[Scene, ScenePath]]) -> None:
@@ -135,6 +136,25 @@ def _walls(scene: Scene) -> list[LinePrimitive]:
 def _free_space(scene: Scene) -> list[LinePrimitive]:
     """Return the outlines of free space, each a loop."""
     return [_line("LineLoop", ring, OUTLINE, [GREY] * len(ring)) for ring in scene.map.free_space]
+
+
+def _marks(scene: Scene) -> list[TextPrimitive]:
+    """Return the label of each mark where it lies."""
+    from foxglove.messages import Color, Pose, TextPrimitive, Vector3
+
+    return [
+        TextPrimitive(
+            pose=Pose(
+                position=Vector3(x=mark.position[0], y=mark.position[1], z=0.0),
+                orientation=_turned(0.0),
+            ),
+            billboard=True,
+            font_size=LETTERS,
+            color=Color(r=0.8, g=0.1, b=0.1, a=1.0),
+            text=mark.label,
+        )
+        for mark in scene.marks
+    ]
 
 
 def _line(

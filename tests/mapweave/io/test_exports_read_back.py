@@ -151,7 +151,11 @@ def test_the_same_map_gives_the_same_recording_and_an_empty_one_a_readable_one(
         export(known, tmp_path / f"{name}.mcap")
     assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "other.mcap").read_bytes()
     export(RobotMap("a", "0", 1, ()), tmp_path / "empty.mcap")
-    assert [topic for topic, _, _ in messages(tmp_path / "empty.mcap")] == ["/walls", "/free_space"]
+    assert [topic for topic, _, _ in messages(tmp_path / "empty.mcap")] == [
+        "/walls",
+        "/free_space",
+        "/marks",
+    ]
 
 
 def test_without_foxglove_a_recording_names_the_extra(
