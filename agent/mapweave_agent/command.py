@@ -168,4 +168,9 @@ def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> N
         run.run(options.scans.of(source.scans()), ReplayClock(options.rate), stopping)
 
 
-command = Command("Map the scans of one robot, and compare with its team.", _configure, _run)
+command = Command(
+    "Map the scans of one robot, and compare with its team.",
+    _configure,
+    _run,
+    "--robot r1 --team rescue --source ros2:/scan",
+)
