@@ -43,7 +43,16 @@ def busy(description: str) -> Iterator[None]:
     if not sys.stderr.isatty():
         yield
         return
-    with Console(stderr=True).status(description):
+    # What is printed meanwhile is left alone.
+    spinner = Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=False,
+    )
+    with spinner:
+        spinner.add_task(description, total=None)
         yield
 
 
