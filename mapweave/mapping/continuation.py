@@ -10,12 +10,25 @@ import numpy as np
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import RobotMap, Submap
+from mapweave.marks import Mark
 
 
 def to_continue(known: RobotMap | None) -> tuple[Submap, ...]:
     """Return the submaps of a map that a run goes on from, their ids from 0; none without one."""
     submaps = () if known is None else known.submaps
     return tuple(replace(submap, id=number) for number, submap in enumerate(submaps))
+
+
+def marks_to_keep(known: RobotMap | None) -> tuple[Mark, ...]:
+    """Return the marks of such a map, those held by submaps by their ids from 0."""
+    if known is None:
+        return ()
+    numbers = {submap.id: k for k, submap in enumerate(known.submaps)}
+    return tuple(
+        replace(mark, anchor=replace(mark.anchor, submap=numbers.get(mark.anchor.submap, 0)))
+        for mark in known.marks
+        if mark.anchor.scan is not None or mark.anchor.submap in numbers
+    )
 
 
 def first_component(submaps: Sequence[Submap]) -> int:

@@ -66,4 +66,9 @@ def cause_of(text: str) -> str:
     return said[1].strip() if said else text.partition("\n")[0]
 
 
-command = Command("Run the process through which all the others reach each other.", configure, run)
+command = Command(
+    "Run the process through which all the others reach each other.",
+    configure,
+    run,
+    "--listen tcp/0.0.0.0:7447",
+)
