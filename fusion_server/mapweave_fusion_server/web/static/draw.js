@@ -140,7 +140,7 @@ export function drawMark(context, camera, place, label, taken) {
   const width = context.measureText(label).width;
   const places = [[u + 12, v - 10], [u - 12 - width, v - 10], [u - width / 2, v + 10], [u - width / 2, v - 30]].map(([left, top]) => [left, top, width, TAG]);
   const free = places.find((one) => taken.every((other) => !overlap(one, other))) ?? places[0];
-  taken.push([u - 9, v - 9, 18, 18], free);
+  taken.push(free);
   write(context, free[0], free[1] + 15, label);
 }
 

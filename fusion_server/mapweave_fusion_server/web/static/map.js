@@ -269,11 +269,12 @@ export class MapView {
   }
 
   #drawMarks(context, cast, taken) {
-    for (const { scene, pose, opacity } of cast) {
+    const marks = cast.flatMap(({ scene, pose, opacity }) => scene.marks.map(({ position, label }) =>
+      ({ place: compose(pose, [...position, 0]), label, opacity })));
+    taken.push(...marks.map(({ place }) => this.camera.toScreen(place[0], place[1])).map(([u, v]) => [u - 9, v - 9, 18, 18]));
+    for (const { place, label, opacity } of marks) {
       context.globalAlpha = opacity;
-      for (const { position, label } of scene.marks) {
-        draw.drawMark(context, this.camera, compose(pose, [...position, 0]), label, taken);
-      }
+      draw.drawMark(context, this.camera, place, label, taken);
     }
     context.globalAlpha = 1;
   }
