@@ -303,10 +303,11 @@ class AgentRun:
             snapshot = self._mapper.snapshot()
         mapped = without_strays(snapshot.robot_map())
         self._published = numbered_from(mapped, self._first)
-        self._outbox.send_map(self._published, complete=complete)
+        arrives = self._outbox.send_map(self._published, complete=complete)
         self._tell(self._published)
         self._state.keep(self._published)
-        self._comparisons.own_map(self._published, finished=self._finished)
+        # Peers compare what has arrived: so do we, that it is decided alike on both ends.
+        self._comparisons.own_map(arrives, finished=self._finished)
         self._publication.published(time.monotonic())
 
     def _publish_marks(self) -> None:

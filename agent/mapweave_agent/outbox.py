@@ -103,9 +103,10 @@ class Outbox:
         """What was published last of each pair of robots."""
         return self._found.values()
 
-    def send_map(self, robot_map: RobotMap, *, complete: bool) -> None:
-        """Publish a version of the map, or all of it if `complete`."""
+    def send_map(self, robot_map: RobotMap, *, complete: bool) -> RobotMap:
+        """Publish a version of the map, or all of it if `complete`; return it as it arrives."""
         self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
+        return self._sender.as_sent(robot_map)
 
     def send_past(self, run: PastRun) -> None:
         """Publish the map of an earlier run."""

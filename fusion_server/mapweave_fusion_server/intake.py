@@ -5,7 +5,6 @@ and dropped. Knows no clock.
 """
 
 import logging
-from collections import defaultdict
 from collections.abc import Set
 from typing import TypeVar
 
@@ -16,7 +15,7 @@ from mapweave_fusion_server.journal import record
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import RobotReport
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.assembler import MapAssembler, MapSender
+from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import (
     Arrival,
     alignment_reader,
@@ -87,7 +86,6 @@ class Intake:
         self._last_heard: dict[str, float] = {}
         self._lacking = Lacking()
         self._assembler = MapAssembler()
-        self._packers: defaultdict[Run, MapSender] = defaultdict(MapSender)
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
         self._warned_of_too_many = False
@@ -244,7 +242,7 @@ class Intake:
     def _pack(self, robot_map: RobotMap) -> bytes | None:
         """Return the complete message; None if the parts that came make too large a whole."""
         try:
-            return self._packers[robot_map.robot, robot_map.boot].payload(robot_map, complete=True)
+            return encode(self._assembler.complete(robot_map))
         except MessageError as error:
             if robot_map.robot not in self._too_large:
                 self._too_large.add(robot_map.robot)

@@ -19,10 +19,11 @@ from mapweave.scan.scan import Scan
 from mapweave_agent.agent import AgentRun
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
+from mapweave_protocol.wire.coding.trajectory_code import PER_METRE
 from mapweave_protocol.wire.messages import PoseMessage
 from tests.agent.test_agent import MAPWEAVE, PATIENCE, SCANS, Listener
 
-MILLIMETRE = 1.1e-3  # [m] what travels is rounded to
+HALF_A_STEP = 0.501 / PER_METRE  # [m] of the poses of scans on the wire
 
 
 def scans_of(log: Path) -> list[Scan]:
@@ -50,7 +51,7 @@ def assert_mapped(robot_map: RobotMap, scans: list[Scan]) -> None:
     for submap, other in zip(robot_map.submaps, expected.submaps, strict=True):
         paths = submap.trajectory, other.trajectory
         np.testing.assert_array_equal(paths[0].scan_index, paths[1].scan_index)
-        np.testing.assert_allclose(paths[0].pose, paths[1].pose, atol=MILLIMETRE)
+        np.testing.assert_allclose(paths[0].pose, paths[1].pose, atol=HALF_A_STEP)
 
 
 def test_lines_on_standard_input_are_mapped_as_their_log_is(
@@ -111,6 +112,7 @@ def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(
     endpoint: str, team: str, logs: list[Path]
 ) -> None:
     scans, told, all_told = scans_of(logs[0]), list[PoseMessage](), threading.Event()
+    awaited = []
 
     def tell(pose: PoseMessage) -> None:
         told.append(pose)
@@ -121,17 +123,19 @@ def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(
         "a", team, connect=endpoint, patience=PATIENCE, on_pose=tell
     ) as agent:
         for index, scan in enumerate(scans):
+            awaited += [index] * bool(told)  # who subscribes is late: the first ones may be lost
             agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
-            while agent.waiting or (told and told[-1].scan_index < index):
+            while agent.waiting or (index in awaited and told[-1].scan_index < index):
                 time.sleep(0.005)
         assert all_told.wait(PATIENCE)
     mapper, heard = Mapper("a"), {pose.scan_index: pose for pose in told}
-    assert sorted(heard) == list(range(told[0].scan_index, len(scans)))  # who subscribes is late
+    assert set(awaited) <= set(heard)
+    assert len(awaited) > len(scans) / 2
     for index, scan in enumerate(scans):
         placement = mapper.add(scan)
         if index in heard and placement.pose is not None:
             assert (heard[index].found, heard[index].component) == (True, "a/0")
-            np.testing.assert_allclose(np.array(heard[index].pose), placement.pose, atol=1e-9)
+            np.testing.assert_allclose(np.array(heard[index].pose), placement.pose, atol=6e-5)
 
 
 def test_scans_are_mapped_while_the_agent_is_held_up_with_everything_else(

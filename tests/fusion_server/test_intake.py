@@ -14,10 +14,11 @@ from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.keys import MAP, STATUS
 from mapweave_protocol.wire.messages import StatusMessage
 
-SEGMENTS = 180_000  # of random numbers: four submaps fit into a message, eight do not
+SEGMENTS = 100
 
 
 def _submap(number: int) -> Submap:
@@ -30,8 +31,9 @@ def _submap(number: int) -> Submap:
 
 
 def test_a_map_that_is_too_large_as_a_whole_is_logged_once_and_dropped(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(entropy, "MAX_NUMBERS", 4 * 9 * SEGMENTS)  # 5 to 8 of each segment
     submaps = tuple(_submap(number) for number in range(8))
     sender, key = MapSender(), MAP.build(team="t", robot="a")
     with Store(tmp_path / "store.sqlite", "t") as store:

@@ -108,7 +108,7 @@ def test_the_last_map_of_a_robot_that_is_gone_can_be_asked_for(
     robot_map = MapAssembler().update(message)
     assert robot_map is not None
     [submap], [sent] = robot_map.submaps, found[0].submaps
-    np.testing.assert_allclose(submap.map.segments, sent.map.segments, atol=1e-3)
+    np.testing.assert_allclose(submap.map.segments, sent.map.segments, atol=0.01)
     assert ask_robot_map(network.connect(), network.team, "nobody") is None
 
 

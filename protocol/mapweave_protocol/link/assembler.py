@@ -1,19 +1,16 @@
 """A robot's map as a stream of messages: what to send, and how to put it together again.
 
-Both ends know neither clock nor network. A sender repeats the whole map whenever what it sent
-since the last time outweighs it: the total stays within twice the changes, and somebody who comes
-late, or missed something, soon has the whole map.
+Both ends know neither clock nor network. What changed is sent, with a digest of the whole: who has
+missed something sees it. Now and then the whole map is sent, so that somebody who comes late soon
+has it.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-
-import numpy as np
 
 from mapweave.maps import RobotMap, Submap
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.geometry import PackedSubmap
-from mapweave_protocol.wire.map_message import MapMessage, Place
+from mapweave_protocol.wire.map_message import MapMessage, Place, state_of
 
 MESSAGES_TO_COMPLETE = 64  # at most, from one complete message to the next: a cache holds as many
 REMEMBERED_BOOTS = 16
@@ -25,9 +22,8 @@ class MapSender:
     def __init__(self) -> None:
         self._packed: dict[int, tuple[Submap, PackedSubmap]] = {}
         self._sent: dict[int, bytes] = {}
-        self._bytes_complete = 0
-        self._bytes_since = 0
-        self._messages_since = 0
+        self._places: dict[int, Place] = {}
+        self._messages_since: int | None = None
 
     def payload(self, robot_map: RobotMap, *, complete: bool = False) -> bytes:
         """Return what to publish so that receivers get to `robot_map`.
@@ -48,10 +44,20 @@ class MapSender:
         changed = {p.id for p in packed if self._sent.get(p.id) != p.digest}
         everything = {p.id for p in packed}
         whole = complete or self._due
-        payload = encode(MapMessage.of_packed(robot_map, packed, everything if whole else changed))
+        included, before = (everything, None) if whole else (changed, self._places)
+        payload = encode(MapMessage.of_packed(robot_map, packed, included, before))
         self._sent = {p.id: p.digest for p in packed}
-        self._count(len(payload), whole=whole)
+        self._places = {submap.id: Place.of(submap) for submap in robot_map.submaps}
+        self._messages_since = 0 if whole else (self._messages_since or 0) + 1
         return payload
+
+    def as_sent(self, robot_map: RobotMap) -> RobotMap:
+        """Return `robot_map` as it arrives, so that both ends decide alike."""
+        submaps = (
+            replace(self._pack(s).restored, component=s.component, pose=Place.of(s).pose)
+            for s in robot_map.submaps
+        )
+        return replace(robot_map, submaps=tuple(submaps))
 
     def _pack(self, submap: Submap) -> PackedSubmap:
         """Return `submap` packed; a finished one keeps its map, so it is packed once."""
@@ -64,16 +70,8 @@ class MapSender:
 
     @property
     def _due(self) -> bool:
-        """Whether everything is to be sent again."""
-        many = self._messages_since >= MESSAGES_TO_COMPLETE - 1
-        return many or self._bytes_since >= self._bytes_complete
-
-    def _count(self, size: int, *, whole: bool) -> None:
-        if whole:
-            self._bytes_complete, self._bytes_since, self._messages_since = size, 0, 0
-        else:
-            self._bytes_since += size
-            self._messages_since += 1
+        """Whether everything is to be sent again: at first, and before a cache has lost it."""
+        return self._messages_since is None or self._messages_since >= MESSAGES_TO_COMPLETE - 1
 
 
 @dataclass
@@ -81,50 +79,75 @@ class _Held:
     """The geometry of a submap as of a message."""
 
     version: int
-    digest: bytes
-    submap: Submap
+    packed: PackedSubmap
 
 
 @dataclass
 class _Run:
-    """What is held of one run of a robot."""
+    """What is held of one run of a robot.
+
+    Attributes
+    ----------
+    places
+        By submap, since which version it lies there; nowhere when it is no longer part of the map.
+    """
 
     boot: str
     held: dict[int, _Held] = field(default_factory=dict)
+    places: dict[int, tuple[int, Place | None]] = field(default_factory=dict)
     newest: MapMessage | None = None
     delivered: int = -1
 
     def take(self, message: MapMessage) -> None:
         """Keep what is newer in `message` than what is held."""
-        digests = {place.id: place.digest for place in message.places}
-        for packed in message.submaps:
-            held, digest = self.held.get(packed.id), digests[packed.id]
-            if held is not None and held.digest == digest:
-                held.version = max(held.version, message.version)  # and the same object still
-            elif held is None or held.version <= message.version:
-                submap = packed.unpack(0, np.zeros(3))
-                self.held[packed.id] = _Held(message.version, digest, submap)
+        for packed in message.changes.submaps:
+            self._take_geometry(packed, message.version)
+        gone = set(message.changes.gone)
+        if message.complete:
+            gone = self.places.keys() - {place.id for place in message.changes.places}
+        for submap in gone:
+            self._take_place(submap, None, message.version)
+        for place in message.changes.places:
+            self._take_place(place.id, place, message.version)
         if self.newest is None or self.newest.version < message.version:
             self.newest = message
 
     def deliver(self) -> RobotMap | None:
-        """Return the newest map, once: None while some of its geometry is missing."""
+        """Return the newest map, once: None while what is held is not what is meant."""
         newest = self.newest
-        if newest is None or newest.version <= self.delivered or not self._has(newest.places):
+        if newest is None or newest.version <= self.delivered or not self._is(newest.state):
             return None
         self.delivered = newest.version
-        submaps = tuple(self._placed(place) for place in newest.places)
+        submaps = tuple(self._placed(place) for place in self.present)
         return RobotMap(newest.robot, newest.boot, newest.version, submaps)
 
-    def _has(self, places: Sequence[Place]) -> bool:
-        return all(
-            (held := self.held.get(place.id)) is not None and held.digest == place.digest
-            for place in places
-        )
+    @property
+    def present(self) -> list[Place]:
+        """Where the submaps of the newest map lie, as far as it is known, ids ascending."""
+        places = (self.places[submap][1] for submap in sorted(self.places))
+        return [place for place in places if place is not None]
+
+    def _take_geometry(self, packed: PackedSubmap, version: int) -> None:
+        held = self.held.get(packed.id)
+        if held is not None and held.packed.digest == packed.digest:
+            held.version = max(held.version, version)  # and the same object still
+        elif held is None or held.version <= version:
+            self.held[packed.id] = _Held(version, packed)
+
+    def _take_place(self, submap: int, place: Place | None, version: int) -> None:
+        if submap not in self.places or self.places[submap][0] <= version:
+            self.places[submap] = version, place
+
+    def _is(self, state: bytes) -> bool:
+        """Tell whether what is held is the map of that digest."""
+        present = self.present
+        if any(place.id not in self.held for place in present):
+            return False
+        return state_of((p, self.held[p.id].packed.digest) for p in present) == state
 
     def _placed(self, place: Place) -> Submap:
-        submap = self.held[place.id].submap
-        return replace(submap, component=place.component, pose=np.array(place.pose))
+        submap = self.held[place.id].packed.restored
+        return replace(submap, component=place.component, pose=place.pose)
 
 
 class MapAssembler:
@@ -142,6 +165,18 @@ class MapAssembler:
         run = self._run(message)
         run.take(message)
         return run.deliver()
+
+    def complete(self, robot_map: RobotMap) -> MapMessage:
+        """Return the complete message of a map that `update` has just given.
+
+        Raises
+        ------
+        MessageError
+            If the parts that came make too large a whole.
+        """
+        run = self._runs[robot_map.robot][robot_map.boot]
+        packed = [run.held[submap.id].packed for submap in robot_map.submaps]
+        return MapMessage.of_packed(robot_map, packed, {p.id for p in packed})
 
     def missing(self, robot: str) -> bool:
         """Tell whether a newer map of `robot` is known of than could be put together."""

@@ -71,7 +71,7 @@ class WireReason(WireModel):
         """Return `reason` for the wire."""
         return cls(
             kind=reason.kind,
-            numbers={name: float(number) for name, number in reason.numbers.items()},
+            numbers={name: _short(number) for name, number in reason.numbers.items()},
             text=reason.text,
             found=None if reason.found is None else cls.pack(reason.found),
         )
@@ -94,22 +94,21 @@ class WireReason(WireModel):
 
 
 class WireAlignment(WireModel):
-    """An alignment of two components; without a cause, the reason is all that is known of it."""
+    """An alignment of two components."""
 
     reference: ComponentName
     other: ComponentName
     transform: Transform
     decision: Decision
     confidence: Probability
-    reason: Sentence
     evidence: dict[Label, Number] = Field(max_length=MAX_EVIDENCE)
     runner_up: WireRunnerUp | None
+    cause: WireReason
     status: Annotated[StatusKind | None, Field(strict=False)] = None
     set_aside_by: tuple[tuple[ComponentName, ComponentName], ...] = Field(
         default=(), max_length=MAX_ALIGNMENTS
     )
     revoked_in: Count | None = None
-    cause: WireReason | None = None
 
     @classmethod
     def pack(cls, alignment: Alignment) -> Self:
@@ -120,8 +119,7 @@ class WireAlignment(WireModel):
             other=alignment.other,
             transform=to_transform(alignment.transform),
             decision=alignment.decision,
-            confidence=float(alignment.confidence),
-            reason=alignment.reason,
+            confidence=_short(alignment.confidence),
             evidence=_measured(alignment.evidence.by_name()),
             runner_up=None if rival is None else WireRunnerUp.pack(rival),
             status=None if status is None else status.kind,
@@ -143,7 +141,7 @@ class WireAlignment(WireModel):
             transform=np.array(self.transform),
             decision=self.decision,
             confidence=self.confidence,
-            cause=Reason.words(self.reason) if self.cause is None else self.cause.unpack(),
+            cause=self.cause.unpack(),
             evidence=Evidence.of(self.evidence),
             runner_up=None if self.runner_up is None else self.runner_up.unpack(),
             status=self._status(),
@@ -157,7 +155,7 @@ class WireAlignment(WireModel):
 
 def _measured(numbers: Mapping[str, float]) -> dict[str, float]:
     """Return the finite ones of `numbers`; the residual of nothing, say, is none."""
-    return {name: float(number) for name, number in numbers.items() if math.isfinite(number)}
+    return {name: _short(number) for name, number in numbers.items() if math.isfinite(number)}
 
 
 class AlignmentMessage(Message):
@@ -173,7 +171,8 @@ class AlignmentMessage(Message):
         One for each pair of components, its `reference` of the robot `reference`.
     """
 
-    format: ClassVar[str] = "mapweave/alignment-message/1"
+    letter: ClassVar[bytes] = b"a"
+    format: ClassVar[str] = "alignment"
 
     robot: Id
     reference: MapVersion
@@ -203,3 +202,8 @@ class AlignmentMessage(Message):
     def unpack(self) -> tuple[Alignment, ...]:
         """Return the alignments."""
         return tuple(alignment.unpack() for alignment in self.alignments)
+
+
+def _short(number: float) -> float:
+    """Return `number` with no more digits than were measured: each costs bytes."""
+    return float(f"{number:.4g}")

@@ -1,21 +1,31 @@
 """Messages to bytes and back.
 
-A payload is a msgpack map ``{"format": …, "deflated": bool, "body": bytes}``; the body is the
-msgpack of the message, compressed when that made it smaller. Whatever the bytes, decoding gives a
-valid message or raises `MessageError`, and allocates no more than a small multiple of the bounds.
+A payload is ``mw``, a byte with the version of the wire, a letter for the kind of message, a byte
+that tells how the body is packed, and the body: the msgpack of an array of the message's values (a
+map of them by name is read as well), compressed when that made it smaller. Whatever the bytes,
+decoding gives a valid message or raises `MessageError`, and allocates no more than a small multiple
+of the bounds.
 """
 
 import zlib
+from decimal import Decimal
 from typing import TypeVar
 
 import msgpack
 from pydantic import ValidationError
 
 from mapweave_protocol.errors import MessageError
+from mapweave_protocol.wire.dictionary import DICTIONARY
 from mapweave_protocol.wire.model import MAX_ALIGNMENTS, Message
 
+MAGIC = b"mw"
+VERSION = 3
 MAX_PAYLOAD = 16 * 2**20  # [bytes]
 MAX_BODY = 64 * 2**20  # [bytes] decompressed
+PLAIN, DEFLATED = b"\0", b"\1"
+_HEAD = len(MAGIC) + 3
+_MAX_EXPONENT = 40
+_EARLIER = (0x83,)  # a msgpack map of three, which versions 1 and 2 began with
 
 M = TypeVar("M", bound=Message)
 
@@ -28,12 +38,12 @@ def encode(message: Message) -> bytes:
     MessageError
         If it is too large to be sent.
     """
-    body: bytes = msgpack.packb(message.model_dump())
-    deflated = zlib.compress(body)
+    body: bytes = msgpack.packb(_decimals(message.values()))
+    packer = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=DICTIONARY)
+    deflated = packer.compress(body) + packer.flush()
     smaller = len(deflated) < len(body)
-    payload: bytes = msgpack.packb(
-        {"format": message.format, "deflated": smaller, "body": deflated if smaller else body}
-    )
+    head = MAGIC + bytes([VERSION]) + message.letter + (DEFLATED if smaller else PLAIN)
+    payload = head + (deflated if smaller else body)
     if len(payload) > MAX_PAYLOAD or len(body) > MAX_BODY:
         raise MessageError(message.format, f"{len(payload)} bytes, expected at most {MAX_PAYLOAD}")
     return payload
@@ -49,11 +59,48 @@ def decode(kind: type[M], payload: bytes) -> M:
     """
     if len(payload) > MAX_PAYLOAD:
         raise MessageError(kind.format, f"{len(payload)} bytes, expected at most {MAX_PAYLOAD}")
-    fields = _unpack(kind, _body(kind, _unpack(kind, payload)))
+    fields = _unpack(kind, _body(kind, payload))
     try:
         return kind.model_validate(fields)
     except ValidationError as error:
         raise MessageError(kind.format, _first_problem(error)) from error
+
+
+def _body(kind: type[Message], payload: bytes) -> bytes:
+    """Return the body, decompressed."""
+    _check_head(kind, payload)
+    body = payload[_HEAD:]
+    match payload[_HEAD - 1 : _HEAD]:
+        case b"\0":
+            return body
+        case b"\1":
+            return _inflate(kind, body)
+    raise MessageError(kind.format, "packed in an unknown way, expected plain or deflated")
+
+
+def _check_head(kind: type[Message], payload: bytes) -> None:
+    if payload[:1] and payload[0] in _EARLIER:
+        raise MessageError(kind.format, f"of an earlier version of the wire, expected {VERSION}")
+    if len(payload) < _HEAD or not payload.startswith(MAGIC):
+        raise MessageError(kind.format, f"expected it to begin with {MAGIC.decode()}")
+    if payload[2] != VERSION:
+        raise MessageError(kind.format, f"version {payload[2]} of the wire, expected {VERSION}")
+    if payload[3:4] != kind.letter:
+        raise MessageError(
+            kind.format, f"found kind {payload[3:4]!r}, expected {kind.letter.decode()!r}"
+        )
+
+
+def _inflate(kind: type[Message], data: bytes) -> bytes:
+    inflater = zlib.decompressobj(zdict=DICTIONARY)
+    try:
+        body = inflater.decompress(data, MAX_BODY)
+    # Also for another dictionary: its checksum is in the data.
+    except zlib.error as error:
+        raise MessageError(kind.format, "damaged compressed body") from error
+    if not inflater.eof:
+        raise MessageError(kind.format, f"cut off, or more than {MAX_BODY} bytes decompressed")
+    return body
 
 
 def _unpack(kind: type[Message], data: bytes) -> object:
@@ -63,7 +110,8 @@ def _unpack(kind: type[Message], data: bytes) -> object:
             use_list=False,
             max_array_len=MAX_ALIGNMENTS,
             max_map_len=MAX_ALIGNMENTS,
-            max_ext_len=0,
+            max_ext_len=4,
+            ext_hook=_decimal,
         )
     # msgpack raises ValueError and its subclasses for all damage, TypeError for unhashable keys.
     except (ValueError, TypeError) as error:
@@ -72,24 +120,33 @@ def _unpack(kind: type[Message], data: bytes) -> object:
         ) from error
 
 
-def _body(kind: type[Message], envelope: object) -> bytes:
-    match envelope:
-        case {"format": kind.format, "deflated": bool(deflated), "body": bytes(body)}:
-            return _inflate(kind, body) if deflated else body
-        case {"format": str(other)}:
-            raise MessageError(kind.format, f"found format {other[:64]!r}")
-    raise MessageError(kind.format, "expected a map of format, deflated and body")
+def _decimals(value: object) -> object:
+    """Return `value` with floats of few digits as extensions: the exponent, and the digits."""
+    match value:
+        case dict():
+            return {key: _decimals(item) for key, item in value.items()}
+        case tuple():
+            return tuple(_decimals(item) for item in value)
+        case float():
+            return _extension(value)
+    return value
 
 
-def _inflate(kind: type[Message], data: bytes) -> bytes:
-    inflater = zlib.decompressobj()
-    try:
-        body = inflater.decompress(data, MAX_BODY)
-    except zlib.error as error:
-        raise MessageError(kind.format, "damaged compressed body") from error
-    if not inflater.eof:
-        raise MessageError(kind.format, f"cut off, or more than {MAX_BODY} bytes decompressed")
-    return body
+def _extension(value: float) -> object:
+    sign, digits, exponent = Decimal(repr(value)).as_tuple()
+    if not isinstance(exponent, int) or not -_MAX_EXPONENT <= exponent <= _MAX_EXPONENT:
+        return value
+    number = int("".join(map(str, digits))) * (-1 if sign else 1)
+    size = next((n for n in (1, 2, 4) if -(1 << 8 * n - 1) <= number < 1 << 8 * n - 1), 0)
+    if not size or not number:
+        return value
+    return msgpack.ExtType(exponent + _MAX_EXPONENT, number.to_bytes(size, "little", signed=True))
+
+
+def _decimal(code: int, data: bytes) -> float:
+    if not 0 <= code <= 2 * _MAX_EXPONENT:
+        raise ValueError("an extension that is no number")
+    return float(f"{int.from_bytes(data, 'little', signed=True)}e{code - _MAX_EXPONENT}")
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -1,62 +1,59 @@
-"""The parts of messages that hold geometry: submaps, lines, free space, trajectories, packed."""
+"""The parts of messages that hold geometry: submaps and line maps, as whole numbers."""
 
+from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
 from typing import Self
 
-import msgpack
 import numpy as np
-from pydantic import Field, model_validator
 
-from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.segments import lengths
-from mapweave.maps import LineMap, Submap, Trajectory
-from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.model import WireModel
+from mapweave.maps import LineMap, Submap
+from mapweave_protocol.wire.coding.entropy import Coder
+from mapweave_protocol.wire.coding.free_space_code import CodedFreeSpace, code_free_space
+from mapweave_protocol.wire.coding.line_code import CodedLines, code_lines, main_turn
+from mapweave_protocol.wire.coding.trajectory_code import Clock, CodedTrajectory, code_trajectory
+from mapweave_protocol.wire.packing import whole_numbers
 
 SUBMAP_REACH = 1e3  # [m] from a submap's origin; submaps are some 20 m across
 MAX_SUBMAPS = 4096  # of one robot: some 60 km of path
-MAX_SEGMENTS = 200_000  # of one line map
-MAX_VERTICES = 400_000  # of the free space of one line map
-MAX_SCANS = 100_000  # of one submap
-MAX_SUPPORT = 2**31
 DIGEST_SIZE = 8  # [bytes]
-MAX_BYTES = 8 * 2**20  # of one packed array
+MAX_BYTES = 8 * 2**20  # of one stream
 MAX_WALL = 100_000.0  # [m] of one line map; comparing maps takes time and memory by the metre
 
 
-class PackedLines(WireModel):
+@dataclass(frozen=True, slots=True, eq=False)
+class PackedLines:
     """A line map: segments by polyline, their support, and the free space."""
 
-    segments: bytes = Field(max_length=MAX_BYTES)
-    polyline_lengths: bytes = Field(max_length=MAX_BYTES)
-    support: bytes = Field(max_length=MAX_BYTES)
-    free_space: bytes = Field(max_length=MAX_BYTES)
-    free_space_lengths: bytes = Field(max_length=MAX_BYTES)
+    lines: CodedLines
+    free: CodedFreeSpace
 
     @classmethod
-    def pack(cls, lines: LineMap, reach: float) -> Self:
-        """Return `lines` packed; segments shorter than a millimetre vanish."""
-        segments = packing.quantise(lines.segments, packing.PER_METRE, reach)
-        kept = cls.kept(lines, reach)
-        counts = _run_lengths(lines.polyline[kept])
-        rings = [packing.quantise(ring, packing.PER_METRE, reach) for ring in lines.free_space]
-        vertices = np.vstack([np.empty((0, 2), dtype=np.int64), *rings])
-        return cls(
-            segments=packing.pack_integers(segments[kept].reshape(-1, 2)),
-            polyline_lengths=packing.pack_integers(counts[:, None]),
-            support=packing.pack_integers(lines.support[kept, None]),
-            free_space=packing.pack_integers(vertices),
-            free_space_lengths=packing.pack_integers(
-                np.array([len(ring) for ring in rings], dtype=np.int64)[:, None]
-            ),
-        )
+    def pack(cls, lines: LineMap, reach: float, confidence: FloatArray | None = None) -> Self:
+        """Return `lines` packed, ``(n,)`` `confidence` with them; too short ones vanish.
 
-    @staticmethod
-    def kept(lines: LineMap, reach: float) -> BoolArray:
-        """Return ``(n,)`` which segments of `lines` still have a length in whole millimetres."""
-        segments = packing.quantise(lines.segments, packing.PER_METRE, reach)
-        return np.asarray(np.any(segments[:, :2] != segments[:, 2:], axis=1))
+        Raises
+        ------
+        ValueError
+            If a coordinate is not finite, or beyond `reach` [m].
+        """
+        turn = main_turn(lines)
+        coded = CodedLines.of(lines, turn, reach, confidence)
+        return cls(coded, CodedFreeSpace.of(lines.free_space, turn, reach))
+
+    @classmethod
+    def code(cls, coder: Coder, packed: "PackedLines | None", *, confident: bool = False) -> Self:
+        """Code `packed` with an encoder, or return what a decoder finds.
+
+        Raises
+        ------
+        ValueError
+            If there is too much of anything.
+        """
+        lines = code_lines(coder, packed.lines if packed else None, confident=confident)
+        return cls(lines, code_free_space(coder, packed.free if packed else None))
 
     def unpack(self, reach: float) -> LineMap:
         """Return the line map.
@@ -64,112 +61,92 @@ class PackedLines(WireModel):
         Raises
         ------
         ValueError
-            If the arrays do not fit each other, or a coordinate is beyond `reach` [m].
+            If a coordinate is beyond `reach` [m], or there is more wall than any robot maps.
         """
-        segments = self._segments(reach)
-        counts = packing.unpack_integers(self.polyline_lengths, 1, MAX_SEGMENTS)[:, 0]
-        support = packing.unpack_integers(self.support, 1, MAX_SEGMENTS)[:, 0]
-        _check_partition("polylines", counts, 1, len(segments))
-        if len(support) != len(segments):
-            raise ValueError(f"support of {len(support)} segments, expected {len(segments)}")
-        if np.any((support < 0) | (support > MAX_SUPPORT)):
-            raise ValueError(f"support, expected 0 to {MAX_SUPPORT}")
-        polyline = np.repeat(np.arange(len(counts)), counts)
-        return LineMap(segments, polyline, support, self._free_space(reach))
-
-    def _segments(self, reach: float) -> FloatArray:
-        points = packing.unpack_integers(self.segments, 2, 2 * MAX_SEGMENTS)
-        if len(points) % 2:
-            raise ValueError("a segment without an end")
-        segments = packing.unquantise(points.reshape(-1, 4), packing.PER_METRE, reach)
+        segments, polyline, support = self.lines.restore()
+        # A frame that is turned lets what was at the limit come back a rounding beyond.
+        if not np.all(np.abs(segments) <= 1.01 * reach):
+            raise ValueError(f"expected numbers of at most {reach:g}")
         wall = float(lengths(segments).sum())
         if wall > MAX_WALL:
             raise ValueError(f"{wall:.0f} m of wall, expected at most {MAX_WALL:.0f} m")
         if np.any(np.all(segments[:, :2] == segments[:, 2:], axis=1)):
             raise ValueError("a segment without length")
-        return segments
+        return LineMap(segments, polyline, support, self.free.restore(self.lines.turn, reach))
 
-    def _free_space(self, reach: float) -> tuple[FloatArray, ...]:
-        vertices = packing.unpack_integers(self.free_space, 2, MAX_VERTICES)
-        counts = packing.unpack_integers(self.free_space_lengths, 1, MAX_VERTICES)[:, 0]
-        _check_partition("free-space polygons", counts, 3, len(vertices))
-        metres = packing.unquantise(vertices, packing.PER_METRE, reach)
-        return tuple(np.split(metres, np.cumsum(counts)[:-1])) if len(counts) else ()
+    @property
+    def columns(self) -> list[IntArray]:
+        """All the numbers, in a fixed order."""
+        lines = self.lines
+        sizes = [[len(area), *map(len, area)] for area in self.free.areas]
+        return [
+            np.array([lines.turn, len(lines.counts), len(lines.segments)]),
+            *(lines.counts, lines.segments, lines.support),
+            *([] if lines.confidence is None else [lines.confidence]),
+            *(np.array(size) for size in sizes),
+            *(ring for area in self.free.areas for ring in area),
+        ]
 
 
-class PackedTrajectory(WireModel):
-    """The poses of the scans of a submap."""
+@dataclass(frozen=True, eq=False)
+class PackedSubmap:
+    """A submap without its pose and component, which travel with every message."""
 
-    scan_index: bytes = Field(max_length=MAX_BYTES)
-    stamps: bytes = Field(max_length=MAX_BYTES)
-    poses: bytes = Field(max_length=MAX_BYTES)
+    id: int
+    lines: PackedLines
+    trajectory: CodedTrajectory
 
     @classmethod
-    def pack(cls, trajectory: Trajectory) -> Self:
-        """Return `trajectory` packed."""
-        return cls(
-            scan_index=packing.pack_integers(trajectory.scan_index[:, None]),
-            stamps=packing.pack_integers(packing.quantise_stamps(trajectory.stamp)[:, None]),
-            poses=packing.pack_integers(packing.quantise_poses(trajectory.pose, SUBMAP_REACH)),
-        )
-
-    def unpack(self) -> Trajectory:
-        """Return the trajectory.
+    def pack(cls, submap: Submap) -> Self:
+        """Return the geometry of `submap` packed.
 
         Raises
         ------
         ValueError
-            If the arrays do not fit each other, or a pose is out of reach.
+            If a coordinate is not finite, or too far from the submap's origin.
         """
-        index = packing.unpack_integers(self.scan_index, 1, MAX_SCANS)[:, 0]
-        ticks = packing.unpack_integers(self.stamps, 1, MAX_SCANS)[:, 0]
-        poses = packing.unpack_integers(self.poses, 3, MAX_SCANS)
-        if not len(index) == len(ticks) == len(poses):
-            raise ValueError("scan indices, stamps and poses, expected as many of each")
-        if np.any(index < 0):
-            raise ValueError("negative scan index")
-        stamps = packing.unquantise_stamps(ticks)
-        return Trajectory(index, stamps, packing.unquantise_poses(poses, SUBMAP_REACH))
-
-
-class PackedSubmap(WireModel):
-    """A submap without its pose and component, which travel with every message."""
-
-    id: int = Field(ge=0, lt=MAX_SUBMAPS)
-    lines: PackedLines
-    trajectory: PackedTrajectory
+        lines = PackedLines.pack(submap.map, SUBMAP_REACH)
+        return cls(submap.id, lines, CodedTrajectory.of(submap.trajectory, SUBMAP_REACH))
 
     @classmethod
-    def pack(cls, submap: Submap) -> Self:
-        """Return the geometry of `submap` packed."""
-        return cls(
-            id=submap.id,
-            lines=PackedLines.pack(submap.map, SUBMAP_REACH),
-            trajectory=PackedTrajectory.pack(submap.trajectory),
-        )
+    def code(cls, coder: Coder, packed: "PackedSubmap | None", clock: Clock) -> Self:
+        """Code `packed` with an encoder, or return what a decoder finds.
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        self.lines.unpack(SUBMAP_REACH)
-        self.trajectory.unpack()
-        return self
+        Parameters
+        ----------
+        clock
+            Where the submap before ended.
+
+        Raises
+        ------
+        ValueError
+            If there is too much of anything.
+        """
+        number = coder.count("submap", MAX_SUBMAPS - 1, packed.id if packed else 0)
+        lines = PackedLines.code(coder, packed.lines if packed else None)
+        trajectory = code_trajectory(coder, packed.trajectory if packed else None, clock)
+        return cls(number, lines, trajectory)
 
     @cached_property
     def digest(self) -> bytes:
         """Tells apart the forms of a submap that still grows."""
-        return blake2b(msgpack.packb(self.model_dump()), digest_size=DIGEST_SIZE).digest()
+        columns = [*self.lines.columns, np.array(self.trajectory.rows.shape), self.trajectory.rows]
+        return digest_of(columns)
 
-    def unpack(self, component: int, pose: FloatArray) -> Submap:
-        """Return the submap, with the `component` and ``(3,)`` `pose` given apart."""
+    @cached_property
+    def restored(self) -> Submap:
+        """The submap, at the origin of component 0.
+
+        Raises
+        ------
+        ValueError
+            If something is out of bounds.
+        """
         lines = self.lines.unpack(SUBMAP_REACH)
-        return Submap(self.id, component, pose, lines, self.trajectory.unpack())
+        return Submap(self.id, 0, np.zeros(3), lines, self.trajectory.restore(SUBMAP_REACH))
 
 
-def _run_lengths(labels: IntArray) -> IntArray:
-    """Return how often each of the ascending ``(n,)`` `labels` occurs."""
-    return np.unique(labels, return_counts=True)[1].astype(np.int64)
-
-
-def _check_partition(what: str, counts: IntArray, least: int, total: int) -> None:
-    if np.any((counts < least) | (counts > total)) or int(counts.sum()) != total:
-        raise ValueError(f"{what}: expected lengths of at least {least} that add up to {total}")
+def digest_of(columns: list[IntArray]) -> bytes:
+    """Return the digest of all the numbers, each as 8 bytes, the lowest first."""
+    numbers = b"".join(whole_numbers(column).astype("<i8").tobytes() for column in columns)
+    return blake2b(numbers, digest_size=DIGEST_SIZE).digest()

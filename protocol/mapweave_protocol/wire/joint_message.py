@@ -1,14 +1,16 @@
 """A version of the joint map as a message."""
 
+from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from mapweave.maps import JointComponent, JointMap
-from mapweave_protocol.wire import packing
 from mapweave_protocol.wire.alignment_message import WireAlignment
-from mapweave_protocol.wire.geometry import MAX_BYTES, MAX_SEGMENTS, PackedLines
+from mapweave_protocol.wire.coding.entropy import Decoder, Encoder
+from mapweave_protocol.wire.coding.line_code import CERTAINTIES
+from mapweave_protocol.wire.geometry import MAX_BYTES, PackedLines
 from mapweave_protocol.wire.model import (
     JOINT_REACH,
     MAX_ALIGNMENTS,
@@ -25,26 +27,23 @@ from mapweave_protocol.wire.orders.order_message import MAX_ORDERS, WireOrder
 
 
 class WireComponent(WireModel):
-    """A component of the joint map."""
+    """A component of the joint map; `stream` is its lines with their confidence."""
 
     robots: dict[ComponentName, JointTransform] = Field(min_length=1, max_length=MAX_ALIGNMENTS)
     confidence: Probability
-    lines: PackedLines
-    segment_confidence: bytes = Field(max_length=MAX_BYTES)
+    stream: bytes = Field(max_length=MAX_BYTES)
     marks: tuple[WirePlacedMark, ...] = Field(default=(), max_length=MAX_ALIGNMENTS)
 
     @classmethod
     def pack(cls, component: JointComponent) -> Self:
-        """Return `component` for the wire; confidences of segments in per mille."""
-        lines = PackedLines.pack(component.map, JOINT_REACH)
-        # Segments too short for the wire vanish from both alike: count what is left.
-        kept = PackedLines.kept(component.map, JOINT_REACH)
-        confidence = packing.quantise(component.segment_confidence[kept], 1e3, 1.0)
+        """Return `component` for the wire."""
+        encoder = Encoder()
+        lines = PackedLines.pack(component.map, JOINT_REACH, component.segment_confidence)
+        PackedLines.code(encoder, lines, confident=True)
         return cls(
             robots={name: to_transform(pose) for name, pose in component.robots.items()},
-            confidence=float(component.confidence),
-            lines=lines,
-            segment_confidence=packing.pack_integers(confidence[:, None]),
+            confidence=round(float(component.confidence), 4),
+            stream=encoder.finish(),
             marks=tuple(WirePlacedMark.pack(mark) for mark in component.marks),
         )
 
@@ -53,23 +52,26 @@ class WireComponent(WireModel):
         self.unpack()
         return self
 
+    @cached_property
+    def _lines(self) -> PackedLines:
+        return PackedLines.code(Decoder(self.stream), None, confident=True)
+
     def unpack(self) -> JointComponent:
         """Return the component.
 
         Raises
         ------
         ValueError
-            If its arrays do not fit each other.
+            If its stream is damaged.
         """
-        lines = self.lines.unpack(JOINT_REACH)
-        permille = packing.unpack_integers(self.segment_confidence, 1, MAX_SEGMENTS)[:, 0]
-        if len(permille) != len(lines.segments) or np.any(permille < 0):
-            raise ValueError("segment confidences, expected one of 0 to 1 for each segment")
+        certainties = self._lines.lines.confidence
+        if certainties is None:
+            raise ValueError("segments without a confidence")
         return JointComponent(
             robots={name: np.array(pose) for name, pose in self.robots.items()},
             confidence=self.confidence,
-            map=lines,
-            segment_confidence=packing.unquantise(permille, 1e3, 1.0),
+            map=self._lines.unpack(JOINT_REACH),
+            segment_confidence=certainties / CERTAINTIES,
             marks=tuple(mark.unpack() for mark in self.marks),
         )
 
@@ -85,7 +87,8 @@ class JointMapMessage(Message):
         1, 2, 3…
     """
 
-    format: ClassVar[str] = "mapweave/joint-message/1"
+    letter: ClassVar[bytes] = b"j"
+    format: ClassVar[str] = "joint map"
 
     series: Id
     version: int = Field(ge=1, le=2**53)

@@ -61,7 +61,8 @@ class JointStatusMessage(Message):
         Tells apart which orders of operators are held; nothing where none are.
     """
 
-    format: ClassVar[str] = "mapweave/coordinator-message/1"
+    letter: ClassVar[bytes] = b"c"
+    format: ClassVar[str] = "coordinator status"
 
     boot: Id
     stamp: Number

@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, ClassVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import ID_PATTERN
@@ -38,18 +38,57 @@ JointTransform = tuple[JointMetres, JointMetres, Angle]
 
 
 class WireModel(BaseModel):
-    """Part of a message: exactly these fields, of exactly these types."""
+    """Part of a message: exactly these fields, of exactly these types.
+
+    On the wire it is an array of the values, in the order of the fields; those at the end that are
+    as by default may be left off.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _of_values(cls, fields: object) -> object:
+        if not isinstance(fields, tuple):
+            return fields
+        if len(fields) > len(cls.model_fields):
+            raise ValueError(f"{len(fields)} values, expected at most {len(cls.model_fields)}")
+        return dict(zip(cls.model_fields, fields, strict=False))
+
+    def values(self) -> tuple[object, ...]:
+        """Return the values of the fields, in their order, as they travel."""
+        fields = type(self).model_fields.items()
+        values = [(getattr(self, name), field) for name, field in fields]
+        while values and not values[-1][1].is_required():
+            value, field = values[-1]
+            if value != field.get_default(call_default_factory=True):
+                break
+            values.pop()
+        return tuple(_plain(value) for value, _ in values)
+
 
 class Message(WireModel):
-    """A message; `format` names it and the version of its layout."""
+    """A message; `letter` tells on the wire which, `format` in words."""
 
+    letter: ClassVar[bytes]
     format: ClassVar[str]
 
 
 def to_transform(pose: FloatArray) -> Transform:
-    """Return the ``(3,)`` `pose` [m, m, rad] as plain numbers."""
+    """Return the ``(3,)`` `pose` [m, m, rad] as plain numbers, of no more digits than matter."""
     x, y, theta = (float(number) for number in pose)
-    return x, y, theta
+    return round(x, 4), round(y, 4), round(theta, 6)
+
+
+def _plain(value: object) -> object:
+    """Return `value` with models as their values, whole floats as integers, others shortened."""
+    match value:
+        case WireModel():
+            return value.values()
+        case dict():
+            return {key: _plain(item) for key, item in value.items()}
+        case tuple():
+            return tuple(_plain(item) for item in value)
+        case float() if value.is_integer() and abs(value) < MAX_COUNT:
+            return int(value)
+    return value

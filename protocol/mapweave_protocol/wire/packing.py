@@ -1,7 +1,6 @@
-"""Numbers as bytes: quantised, as differences from row to row, little-endian.
+"""Numbers quantised: lengths, angles and stamps as whole numbers of small steps, and back.
 
-Quantising is idempotent: packing what was unpacked gives the same bytes. Differences of what lies
-side by side are small, which is what makes the compression of a message pay.
+Quantising is idempotent: packing what was unpacked gives the same numbers.
 """
 
 import numpy as np
@@ -10,48 +9,28 @@ from numpy.typing import ArrayLike
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 
-PER_METRE = 1e3  # millimetres: a tenth of what a laser resolves
-PER_RADIAN = 1e6  # microradians: 0.1 mm at 100 m
-PER_SECOND = 1e4  # exact in a double until the year 9000
-HALF_TURN = 3141592  # the largest angle that, unpacked, still lies in (-pi, pi]
+PER_METRE = 1e3  # of the poses of submaps: what they hold moves along
+PER_RADIAN = 1e5  # 0.2 mm at 20 m
+HALF_TURN = 314159  # the largest angle that, unpacked, still lies in (-pi, pi]
 MAX_STAMP = 1e11  # [s]; an overflown clock says nothing
-UNKNOWN_STAMP = -(2**62)
-WIDTHS = (1, 2, 4, 8)
+MAX_WHOLE = 2**53
 
 
-def pack_integers(values: IntArray) -> bytes:
-    """Return ``(n, k)`` integers as one byte that tells the width, then the differences.
-
-    The differences wrap around at the width of the values, so that they never need more.
-    """
-    width = _width(values)
-    narrow = values.astype(f"<i{width}")
-    differences = np.diff(narrow, axis=0, prepend=np.zeros_like(narrow[:1]))
-    return bytes([width]) + differences.tobytes()
-
-
-def unpack_integers(data: bytes, columns: int, limit: int) -> IntArray:
-    """Return the ``(n, columns)`` integers of `data`.
+def whole_numbers(values: ArrayLike) -> IntArray:
+    """Return `values` as an array.
 
     Raises
     ------
     ValueError
-        If the length does not fit, or n is more than `limit`.
+        If one is larger than a double holds exactly.
     """
-    width = data[0] if data else 0
-    if width not in WIDTHS:
-        raise ValueError(f"width of integers {width}, expected 1, 2, 4 or 8")
-    rows, rest = divmod(len(data) - 1, width * columns)
-    if rest or rows > limit:
-        raise ValueError(f"{len(data)} bytes, expected at most {limit} whole rows of {columns}")
-    differences = np.frombuffer(data, dtype=f"<i{width}", offset=1, count=rows * columns)
-    values = np.cumsum(differences.reshape(rows, columns), axis=0, dtype=f"<i{width}")
-    return values.astype(np.int64)
-
-
-def _width(values: IntArray) -> int:
-    extreme = max(int(values.max()), -int(values.min()) - 1) if values.size else 0
-    return next(width for width in WIDTHS if extreme < 1 << (8 * width - 1))
+    try:
+        array = np.asarray(values, dtype=np.int64)
+    except OverflowError:
+        array = None
+    if array is None or np.any(np.abs(array) > MAX_WHOLE):
+        raise ValueError(f"whole numbers, expected at most {MAX_WHOLE}")
+    return array
 
 
 def quantise(values: ArrayLike, per_unit: float, limit: float) -> IntArray:
@@ -84,7 +63,7 @@ def unquantise(values: IntArray, per_unit: float, limit: float) -> FloatArray:
 
 
 def quantise_poses(poses: ArrayLike, reach: float) -> IntArray:
-    """Return ``(n, 3)`` poses [m, m, rad] as whole millimetres and microradians.
+    """Return ``(n, 3)`` poses [m, m, rad] in steps of 1 mm and 1e-5 rad.
 
     Raises
     ------
@@ -107,16 +86,3 @@ def unquantise_poses(values: IntArray, reach: float) -> FloatArray:
     """
     places = unquantise(values[:, :2], PER_METRE, reach)
     return np.hstack([places, unquantise(values[:, 2:], PER_RADIAN, np.pi)])
-
-
-def quantise_stamps(stamps: FloatArray) -> IntArray:
-    """Return ``(n,)`` stamps [s] in ticks; NaN, and what no clock says, as `UNKNOWN_STAMP`."""
-    known = np.abs(stamps) <= MAX_STAMP
-    ticks = np.rint(np.where(known, stamps, 0.0) * PER_SECOND).astype(np.int64)
-    return np.where(known, ticks, UNKNOWN_STAMP)
-
-
-def unquantise_stamps(ticks: IntArray) -> FloatArray:
-    """Return the ``(n,)`` stamps [s], NaN where unknown."""
-    stamps = ticks / PER_SECOND
-    return np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)

@@ -70,7 +70,8 @@ class PoseMessage(Message):
         The same in the joint frame; None while the joint map does not have the component.
     """
 
-    format: ClassVar[str] = "mapweave/pose-message/1"
+    letter: ClassVar[bytes] = b"p"
+    format: ClassVar[str] = "pose"
 
     robot: Id
     boot: Id
@@ -85,5 +86,5 @@ class PoseMessage(Message):
 
 
 def to_covariance(matrix: FloatArray) -> tuple[float, ...]:
-    """Return the ``(3, 3)`` `matrix` by rows, as plain numbers."""
-    return tuple(float(number) for number in np.asarray(matrix).ravel())
+    """Return the ``(3, 3)`` `matrix` by rows, as plain numbers of no more digits than matter."""
+    return tuple(float(f"{number:.3g}") for number in np.asarray(matrix).ravel())

@@ -49,7 +49,8 @@ class StatusMessage(Message):
         Tells apart which orders of operators are held; nothing where none are.
     """
 
-    format: ClassVar[str] = "mapweave/status-message/1"
+    letter: ClassVar[bytes] = b"s"
+    format: ClassVar[str] = "status"
 
     robot: Id
     boot: Id

@@ -1,11 +1,121 @@
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+import shapely
+import shapely.affinity
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import Polygon, box
+from shapely.ops import unary_union
 
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import IntArray
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
+from mapweave.scan.free_space import from_rings, rings
 from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire import geometry
 from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.coding.outlines import cut_open
+from mapweave_protocol.wire.coding.trajectory_code import PER_SECOND
 from mapweave_protocol.wire.messages import MapMessage
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def through_the_wire(robot_map: RobotMap) -> RobotMap:
+    arrived = MapAssembler().update(decode(MapMessage, encode(MapMessage.pack(robot_map))))
+    assert arrived is not None
+    return arrived
+
+
+def matched(sent: LineMap, arrived: LineMap) -> IntArray:
+    """Return which segment of `arrived` each one of `sent` became: they come in another order."""
+    away = np.abs(sent.segments[:, None] - arrived.segments[None]).max(axis=2)
+    return np.asarray(np.argmin(away, axis=1))
+
+
+@given(seed=SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_walls_arrive_within_a_centimetre_polyline_by_polyline(
+    random_map: Callable[..., RobotMap], seed: int
+) -> None:
+    robot_map = random_map(seed)
+    for sent, arrived in zip(robot_map.submaps, through_the_wire(robot_map).submaps, strict=True):
+        before, after = sent.map, arrived.map
+        assert len(after.segments) == len(before.segments)
+        if not len(before.segments):
+            continue
+        became = matched(before, after)
+        off = (before.segments - after.segments[became]).reshape(-1, 2)
+        assert np.hypot(*off.T).max() <= 0.01
+        together = before.polyline[:, None] == before.polyline[None]
+        assert np.array_equal(
+            together, after.polyline[became][:, None] == after.polyline[became][None]
+        )
+        support = np.maximum(before.support, 1)
+        ratio = np.maximum(after.support[became], 1) / support
+        assert (ratio <= 1.5).all() and (ratio >= 2 / 3).all()
+        assert np.array_equal(before.support == 0, after.support[became] == 0)
+
+
+@given(seed=SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_scans_arrive_within_two_centimetres_and_a_fifth_of_a_degree(
+    random_map: Callable[..., RobotMap], seed: int
+) -> None:
+    robot_map = random_map(seed)
+    for sent, arrived in zip(robot_map.submaps, through_the_wire(robot_map).submaps, strict=True):
+        before, after = sent.trajectory, arrived.trajectory
+        assert np.array_equal(before.scan_index, after.scan_index)
+        assert np.allclose(
+            before.stamp, after.stamp, atol=0.501 / PER_SECOND, rtol=0, equal_nan=True
+        )
+        off = before.pose - after.pose
+        assert (np.hypot(off[:, 0], off[:, 1]) <= 0.02).all()
+        assert (np.abs(se2.wrap(off[:, 2])) <= np.radians(0.2)).all()
+        assert np.allclose(sent.pose[:2], arrived.pose[:2], atol=0.5001e-3)
+        assert sent.component == arrived.component
+
+
+ROOM = np.array([[-3.0, -2.0], [4.0, -2.0], [4.0, 3.0], [-3.0, 3.0]])
+PILLARS = [box(x, 0.0, x + 0.9, 1.0) for x in (-2.0, 0.0, 2.0)]
+
+
+@given(turn=st.floats(-3.0, 3.0), pillars=st.integers(0, 3))
+@settings(max_examples=40, deadline=None)
+def test_free_space_arrives_within_what_margin_and_clearance_leave(
+    turn: float, pillars: int
+) -> None:
+    area = shapely.affinity.rotate(
+        Polygon(ROOM).difference(unary_union(PILLARS[:pillars])), turn, use_radians=True
+    )
+    walls = np.array([np.concatenate(ROOM[[k, k - 1]]) for k in range(4)])
+    segments = se2.transform_segments(np.array([0.0, 0.0, turn]), walls)
+    lines = LineMap(segments, np.arange(4), np.full(4, 3), rings(area))
+    submap = Submap(0, 0, np.zeros(3), lines, Trajectory.empty())
+    (arrived,) = through_the_wire(RobotMap("a", "b1", 1, (submap,))).submaps
+    came = from_rings(arrived.map.free_space)
+    wrong = came.symmetric_difference(area)
+    # Nothing that was not free is so deep in it that it would count against a wall.
+    assert wrong.buffer(-0.2).is_empty
+    for ring in arrived.map.free_space:
+        assert Polygon(ring).is_valid
+
+
+def test_segments_too_short_for_the_wire_vanish() -> None:
+    lines = LineMap(
+        np.array([[0.0, 0.0, 0.001, 0.0], [1.0, 0.0, 4.0, 0.0]]), np.array([0, 1]), np.array([8, 3])
+    )
+    submap = Submap(0, 0, np.zeros(3), lines, Trajectory.empty())
+    (arrived,) = through_the_wire(RobotMap("a", "b1", 1, (submap,))).submaps
+    assert arrived.map.support.tolist() == [3]
+
+
+def test_free_space_whose_holes_cross_its_outline_is_refused() -> None:
+    with pytest.raises(ValueError, match="cross"):
+        cut_open(np.array([[0, 0], [4, 0], [4, 4], [0, 4]]), [np.array([[2, 2], [9, 2], [2, 3]])])
 
 
 def a_map_of(walls: int) -> RobotMap:

@@ -59,7 +59,8 @@ class MarksMessage(Message):
         How often they changed.
     """
 
-    format: ClassVar[str] = "mapweave/marks-message/1"
+    letter: ClassVar[bytes] = b"k"
+    format: ClassVar[str] = "marks"
 
     robot: Id
     boot: Id

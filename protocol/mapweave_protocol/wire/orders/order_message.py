@@ -89,7 +89,8 @@ class OrderMessage(Message):
         Whose runs, and which, are to be forgotten.
     """
 
-    format: ClassVar[str] = "mapweave/order-message/1"
+    letter: ClassVar[bytes] = b"o"
+    format: ClassVar[str] = "order"
 
     id: Id
     kind: Kind
@@ -130,7 +131,8 @@ class OrderMessage(Message):
 class OrdersMessage(Message):
     """All orders that somebody holds, those taken back and what took them back among them."""
 
-    format: ClassVar[str] = "mapweave/orders-message/1"
+    letter: ClassVar[bytes] = b"l"
+    format: ClassVar[str] = "orders"
 
     orders: tuple[OrderMessage, ...] = Field(max_length=MAX_ORDERS)
 

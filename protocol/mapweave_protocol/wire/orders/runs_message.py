@@ -29,6 +29,7 @@ class WireRun(WireModel):
 class RunsMessage(Message):
     """The runs of all robots, those of a robot from its earliest on; forgotten ones as well."""
 
-    format: ClassVar[str] = "mapweave/runs-message/1"
+    letter: ClassVar[bytes] = b"r"
+    format: ClassVar[str] = "runs"
 
     runs: tuple[WireRun, ...] = Field(max_length=MAX_ALIGNMENTS)

@@ -1,0 +1,1 @@
+"""Geometry as whole numbers, and these as few bytes."""

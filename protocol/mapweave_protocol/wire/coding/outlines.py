@@ -1,0 +1,51 @@
+"""Areas with holes: straightened and snapped to a grid, and cut open; what loads shapely."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.scan.free_space import from_rings, rings
+
+
+def straightened(
+    outlines: Sequence[FloatArray], deviation: float
+) -> tuple[tuple[IntArray, ...], ...]:
+    """Return the areas that simple polygons (k, 2) cover, their corners on whole numbers.
+
+    Parameters
+    ----------
+    deviation
+        By which an outline may be straightened, in the unit of the polygons.
+
+    Returns
+    -------
+    tuple of tuple of IntArray
+        Of each area the outside, then its holes, each (k, 2).
+    """
+    simple = shapely.simplify(from_rings(outlines), deviation)
+    whole = shapely.simplify(shapely.set_precision(simple, 1.0), 0.0)
+    areas = [p for p in shapely.get_parts(whole) if isinstance(p, Polygon) and not p.is_empty]
+    return tuple(
+        tuple(_corners(ring) for ring in (area.exterior, *area.interiors)) for area in areas
+    )
+
+
+def cut_open(outside: IntArray, holes: Sequence[IntArray]) -> tuple[FloatArray, ...]:
+    """Return simple polygons without holes that cover an area (k, 2) without its `holes`.
+
+    Raises
+    ------
+    ValueError
+        If it is no area: its outlines cross.
+    """
+    area = Polygon(outside, holes)
+    if not area.is_valid:
+        raise ValueError("an area whose outlines cross")
+    return rings(area)
+
+
+def _corners(ring: shapely.LinearRing) -> IntArray:
+    return np.asarray(np.rint(np.array(ring.coords)[:-1]), dtype=np.int64)
