@@ -25,9 +25,10 @@ def marks_to_continue(known: RobotMap | None) -> tuple[Mark, ...]:
         return ()
     number = {submap.id: k for k, submap in enumerate(known.submaps)}
     return tuple(
-        replace(mark, anchor=replace(mark.anchor, submap=number[mark.anchor.submap]))
+        replace(mark, anchor=replace(mark.anchor, submap=number.get(mark.anchor.submap, 0)))
         for mark in known.marks
-        if mark.anchor.submap in number
+        # Where a scan holds it the submap's number may be one from before it was cut.
+        if mark.anchor.scan is not None or mark.anchor.submap in number
     )
 
 
