@@ -96,7 +96,8 @@ class AgentRun:
             self._comparisons.earlier_map(run.map)
         self._needs = Needs(mapper.robot)
         self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
-        self._marks = OwnMarks(mapper.robot, mapper.boot)
+        self._published: RobotMap = mapper.robot_map()
+        self._marks = OwnMarks(mapper.robot, mapper.boot, self._published.marks)
         self._orders = KeptOrders(state)
         self._reception = Dispatcher(
             mapper.robot,
@@ -110,7 +111,6 @@ class AgentRun:
         self._inbox = Inbox()
         self._mapping = threading.Lock()
         self._live: LiveScans | None = None
-        self._published: RobotMap = mapper.robot_map()
         self._scans_seen = 0
         self._changed = False
         self._unkept = False

@@ -255,6 +255,13 @@ class Store:
             iter(self._messages("robot_map", ((n, f"of {robot}") for (n,) in numbers))), None
         )
 
+    def runs(self) -> list[tuple[str, str, int]]:
+        """Return robot, boot and last component of every run, those of a robot from its first."""
+        columns = "robot, boot, last_component"
+        return self._database.rows(
+            f"SELECT {columns} FROM robot_map ORDER BY robot, last_component"
+        )
+
     def keep_marks(self, run: tuple[str, str], received: float, message: bytes) -> None:
         """Keep the marks of a run, a robot and a boot, in place of those kept before."""
         self._keep(run, "mark", (*run, received), message)

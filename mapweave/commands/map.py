@@ -25,7 +25,6 @@ from mapweave.io.map_files import save
 from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import STANDARD_INPUT, ScanSource, open_source
-from mapweave.mapping.continuation import marks_to_keep
 from mapweave.mapping.grids.grid_map import map_of_grid
 from mapweave.mapping.localization.localizer import Localizer
 from mapweave.mapping.mapper import Mapper
@@ -85,7 +84,7 @@ def _run(options: argparse.Namespace) -> int:
         return _run_grid(options, config)
     source = open_source(options.log, _read_options(options, config))
     mapper = _mapper(options.robot, start, config)
-    robot_map, taken = _map_all(options, source, mapper, start)
+    robot_map, taken = _map_all(options, source, mapper)
     _check_placed(options, _new(robot_map, start), taken)
     _write(options, robot_map)
     figures = _figures(_new(robot_map, start), taken)
@@ -136,7 +135,7 @@ def _mapper(robot: str | None, start: Start, config: Config) -> ScanMapper:
 
 
 def _map_all(
-    options: argparse.Namespace, source: ScanSource, mapper: ScanMapper, start: Start
+    options: argparse.Namespace, source: ScanSource, mapper: ScanMapper
 ) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
     scans = source.count() if sys.stderr.isatty() else None
@@ -146,8 +145,7 @@ def _map_all(
     for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
         mapper.add(scan)
         taken += 1
-    robot_map = mapper.finish()
-    return replace(robot_map, marks=robot_map.marks or marks_to_keep(start.known)), taken
+    return mapper.finish(), taken
 
 
 def _new(robot_map: RobotMap, start: Start) -> RobotMap:

@@ -19,15 +19,16 @@ def to_continue(known: RobotMap | None) -> tuple[Submap, ...]:
     return tuple(replace(submap, id=number) for number, submap in enumerate(submaps))
 
 
-def marks_to_keep(known: RobotMap | None) -> tuple[Mark, ...]:
-    """Return the marks of such a map, those held by submaps by their ids from 0."""
+def marks_to_continue(known: RobotMap | None) -> tuple[Mark, ...]:
+    """Return the marks of a map that a run goes on from, held by the submaps of `to_continue`."""
     if known is None:
         return ()
-    numbers = {submap.id: k for k, submap in enumerate(known.submaps)}
+    number = {submap.id: k for k, submap in enumerate(known.submaps)}
     return tuple(
-        replace(mark, anchor=replace(mark.anchor, submap=numbers.get(mark.anchor.submap, 0)))
+        replace(mark, anchor=replace(mark.anchor, submap=number.get(mark.anchor.submap, 0)))
         for mark in known.marks
-        if mark.anchor.scan is not None or mark.anchor.submap in numbers
+        # Where a scan holds it the submap's number may be one from before it was cut.
+        if mark.anchor.scan is not None or mark.anchor.submap in number
     )
 
 

@@ -16,7 +16,7 @@ from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
-from mapweave.mapping.continuation import first_component, scans_in, to_continue
+from mapweave.mapping.continuation import first_component, marks_to_continue, scans_in, to_continue
 from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
 from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
@@ -109,6 +109,7 @@ class Mapper:
         self._version = 0
         self._finished = list(to_continue(known))
         self._known = len(self._finished)  # submaps, of an earlier run
+        self._marks = marks_to_continue(known)
         self._component = self._newest_component = first_component(self._finished)
         self._on_warning = on_warning
         self._body = OwnBody(self.parameters.own_body)
@@ -179,7 +180,8 @@ class Mapper:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap(self._growing.line_map())]
         submaps = (*with_walls(self._finished, self._unsettled), *growing)
-        return RobotMap(self.robot, self.boot, self._version, submaps, self._made_with)
+        made_with, marks = self._made_with, self._marks
+        return RobotMap(self.robot, self.boot, self._version, submaps, made_with, marks)
 
     def snapshot(self) -> MapSnapshot:
         """Return what `robot_map` would draw now, to be drawn by another thread: takes a moment."""
@@ -193,6 +195,7 @@ class Mapper:
             self._unsettled,
             None if empty else self._submap(LineMap.empty()),
             b"" if empty else MapSnapshot.packed(self._growing),
+            self._marks,
         )
 
     @property
