@@ -23,7 +23,7 @@ from benchmarks import (
     team,
     wire,
 )
-from benchmarks.faults import hostile
+from benchmarks.faults import hostile, kills, lossy, outages
 from benchmarks.speed import command as speed
 
 
@@ -55,6 +55,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     "confidence": fit_confidence,
     "wire": wire,
     "hostile": hostile,
+    "outages": outages,
+    "kills": kills,
+    "lossy": lossy,
     "page": page,
     "mutations": mutations,
 }

@@ -9,6 +9,8 @@ from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
+from mapweave_protocol.link.guard.refusals import Refusals
+from mapweave_protocol.link.guard.strangers import Strangers
 from mapweave_protocol.link.inbox import (
     Arrival,
     Presence,
@@ -20,8 +22,6 @@ from mapweave_protocol.link.inbox import (
     status_reader,
 )
 from mapweave_protocol.link.lacking import Lacking
-from mapweave_protocol.link.refusals import Refusals
-from mapweave_protocol.link.strangers import Strangers
 from mapweave_protocol.wire.messages import StatusMessage
 
 MAX_PEERS = 64  # with a map here
@@ -57,6 +57,7 @@ class Dispatcher:
         orders: KeptOrders,
     ) -> None:
         self._robot = robot
+        self._boot = boot
         self._plan = plan
         self._needs = needs
         self._whereabouts = whereabouts
@@ -102,6 +103,7 @@ class Dispatcher:
             count = self._namesakes.take(presence.boot, here=presence.here)
             if count:
                 _log.warning(tell_robots(self._robot, count))
+        if (presence.robot, presence.boot) == (self._robot, self._boot):
             return
         self._note(presence.robot)
         if presence.here:
@@ -113,23 +115,28 @@ class Dispatcher:
         count = self._coordinators.take(boot, here=here)
         if count:
             _log.warning(tell_coordinators(count))
+        self._whereabouts.coordinator_here(boot, here=here)
+        if not here:
+            self._needs.coordinator_gone(boot)
 
     def _take_joint_status(self, arrival: Arrival) -> None:
         status = self._joint_statuses.read(arrival)
         if status is not None:
             self._needs.coordinator(status)
+            self._plan.coordinator(status)
             self._whereabouts.coordinator(status)
             self._orders.coordinator(status)
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)
-        if message is None or message.robot == self._robot:
+        if message is None or (message.robot, message.boot) == (self._robot, self._boot):
             return
         self._note(message.robot)
-        held = self._plan.version_of(message.robot, message.boot)
+        team = self._plan.team
+        held = team.version_of(message.robot, message.boot)
         if message.version > (held or 0) + FAR:
             self._maps.refuse(arrival.key, f"version {message.version}, far beyond the one here")
-        elif len(self._plan.held) >= MAX_PEERS and not self._plan.knows(message.robot):
+        elif len(team.newest) >= MAX_PEERS and not team.knows(message.robot):
             self._maps.refuse(arrival.key, "there are too many robots already")
         else:
             robot_map = self._assembler.update(message)
@@ -138,7 +145,7 @@ class Dispatcher:
 
     def _take_status(self, arrival: Arrival) -> None:
         status = self._statuses.read(arrival)
-        if status is None or status.robot == self._robot:
+        if status is None or (status.robot, status.boot) == (self._robot, self._boot):
             return
         self._note(status.robot)
         self._needs.peer(status)
@@ -152,19 +159,19 @@ class Dispatcher:
         The peer sees in our status that it is lacking, and sends it again.
         """
         robot, boot = status.robot, status.boot
-        held = self._plan.version_of(robot, boot)
+        held = self._plan.team.version_of(robot, boot)
         false = held is not None and held > status.map_version
         if self._lacking.due(f"{robot} {boot}", held, time.monotonic(), lacks=false):
             _log.warning("the map of %s here is not from it: dropped", robot)
             self._assembler.forget(robot, boot)
-            self._plan.drop_map(robot)
+            self._plan.team.drop(robot, boot)
 
     def _note(self, robot: str) -> None:
-        self._strangers.heard(robot, has_map=self._plan.knows(robot))
+        self._strangers.heard(robot, has_map=self._plan.team.knows(robot))
 
     def _forget(self, robot: str) -> None:
         """Forget what is known of a robot that never came with a map."""
-        self._plan.forget(robot)
+        self._plan.team.forget(robot)
         self._assembler.forget(robot)
 
     def _take_alignment(self, arrival: Arrival) -> None:
@@ -172,3 +179,4 @@ class Dispatcher:
         if message is not None and message.robot != self._robot:
             self._note(message.robot)
             self._plan.learned(message)
+            self._whereabouts.met(message)

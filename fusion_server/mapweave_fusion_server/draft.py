@@ -1,11 +1,20 @@
-"""What a version of the joint map is made of, fixed while it is being built."""
+"""What a version of the joint map is made of, fixed while it is being built, and how soon."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 from mapweave.maps import Alignment, JointMap, RobotMap
 from mapweave.orders import Order
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.revocation import mark_revoked
+
+
+class Urgency(IntEnum):
+    """How soon the next version is due."""
+
+    NONE = 0
+    SOON = 1
+    NOW = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,6 +15,8 @@ from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import RobotReport
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.link.guard.refusals import Refusals
+from mapweave_protocol.link.guard.strangers import Strangers
 from mapweave_protocol.link.inbox import (
     Arrival,
     alignment_reader,
@@ -27,8 +29,6 @@ from mapweave_protocol.link.inbox import (
     status_reader,
 )
 from mapweave_protocol.link.lacking import Lacking
-from mapweave_protocol.link.refusals import Refusals
-from mapweave_protocol.link.strangers import Strangers
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.messages import (
@@ -40,11 +40,13 @@ from mapweave_protocol.wire.messages import (
     StatusMessage,
 )
 from mapweave_protocol.wire.model import Message
-from mapweave_protocol.wire.pairs import Run
+from mapweave_protocol.wire.pairs import Run, name_with_boot, run_of
 
 FAR = 1_000_000  # versions from one message to the next: eleven days of one a second
 
 M = TypeVar("M", bound=Message)
+ASKED_AFTER = 4.0  # [s] that a robot is given to see itself that its map is lacking
+
 _log = logging.getLogger(__name__)
 
 
@@ -90,7 +92,7 @@ class Intake:
         self._held_orders = held_orders_reader(self.refusals)
         self._heard: dict[Run, StatusMessage] = {}
         self._last_heard: dict[str, float] = {}
-        self._lacking = Lacking()
+        self._lacking = Lacking(ASKED_AFTER)
         self._assembler = MapAssembler()
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
@@ -247,12 +249,16 @@ class Intake:
             record(self._story.mapped(new))
             for found in self._early.take(new.robot, new.boot):
                 self._take_alignments(found)
-        elif self._coordinator.clashes(new) and new.boot not in self._clashing:
+            self._tell_clash(new)
+
+    def _tell_clash(self, new: RobotMap) -> None:
+        if self._coordinator.clashes(new) and new.boot not in self._clashing:
             self._clashing.add(new.boot)
             _log.warning(
-                "map of %s ignored: another run of it has components of the same numbers; start its"
-                " agent again while the coordinator is here, with the --state it had",
+                "map of %s: another run of it has components of the same numbers; this one's are"
+                " named %s/…; give each robot an id of its own",
                 new.robot,
+                name_with_boot(run_of(new)),
             )
 
     def _pack(self, robot_map: RobotMap) -> bytes | None:
@@ -268,12 +274,14 @@ class Intake:
     def _take_alignments(self, found: EarlyAlignment) -> None:
         """Take what was found about maps that are here; what is about others waits for them."""
         new = found.message
+        reference, other = (name_with_boot(run_of(end)) for end in (new.reference, new.other))
         if not self._coordinator.has_maps_of(new):
             self._early.keep(found)
         elif self._coordinator.receive_alignments(new):
-            reference, other = (f"{end.robot}@{end.boot}" for end in (new.reference, new.other))
             self._store.add_alignments((reference, other), found.received, found.payload)
             record(self._story.aligned(new))
+        elif self._coordinator.holds(new):
+            self._store.renew_alignments((reference, other), found.payload)
 
     def _note(self, robot: str) -> None:
         self._strangers.heard(robot, has_map=self._held_version(robot) is not None)

@@ -16,12 +16,11 @@ from mapweave_fusion_server.coordinator import (
     CoordinatorParameters,
 )
 from mapweave_fusion_server.early import MOST
-from mapweave_fusion_server.intake import FAR, Intake
+from mapweave_fusion_server.intake import ASKED_AFTER, FAR, Intake
 from mapweave_fusion_server.store import Store
-from mapweave_protocol.link import strangers
 from mapweave_protocol.link.assembler import MapSender
+from mapweave_protocol.link.guard import strangers
 from mapweave_protocol.link.inbox import Arrival
-from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
@@ -108,7 +107,7 @@ def test_a_map_that_is_not_from_the_robot_gives_way_when_that_says_how_far_it_is
     hearing.status("a", 6)
     assert hearing.intake.robots_to_ask(0.0) == ([], [])  # it may be on its way
     hearing.status("a", 6)
-    assert hearing.intake.robots_to_ask(GRACE) == (["a"], [])
+    assert hearing.intake.robots_to_ask(ASKED_AFTER) == (["a"], [])
     hearing.map(make_map("a", 6))  # what it answers
     assert hearing.coordinator.version_of("a", "first") == 6
     held = hearing.coordinator.map_of("a")
@@ -125,7 +124,7 @@ def test_what_was_found_about_a_state_that_never_was_does_not_stand_in_the_way(
     hearing.map(forged)
     hearing.alignments(make_alignments(b, forged))
     assert hearing.joined == 1
-    for now in (0.0, GRACE):
+    for now in (0.0, ASKED_AFTER):
         hearing.status("a", 2)
         hearing.intake.robots_to_ask(now)
     right = make_map("a", 2)

@@ -50,8 +50,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--connect",
         action="append",
+        default=[],
         metavar="ENDPOINT",
-        help="another router to link with; repeatable",
+        help="where another router of the team is, tried until it answers; repeatable",
     )
     parser.add_argument(
         "--insecure", action="store_true", help="listen for other machines without keys, too"
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     link = link_of(options)
     encrypted = link.keys is not None
     endpoints: list[str] = options.listen or [ENCRYPTED_LISTEN if encrypted else DEFAULT_LISTEN]
-    config = router_config(endpoints, link, options.connect or ())
+    config = router_config(endpoints, link, options.connect)
     if not encrypted and not options.insecure:
         _check_here(endpoints)
     if link.keys is not None and link.keys.member.role is not Role.ROUTER:
@@ -98,4 +99,9 @@ def cause_of(text: str) -> str:
     return said[1].strip() if said else text.partition("\n")[0]
 
 
-command = Command("Run the process through which all the others reach each other.", configure, run)
+command = Command(
+    "Run the process through which all the others reach each other.",
+    configure,
+    run,
+    "--listen tcp/0.0.0.0:7447",
+)

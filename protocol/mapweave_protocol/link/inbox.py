@@ -11,8 +11,8 @@ import zenoh
 
 from mapweave.errors import MapweaveError
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.refusals import Refusals
-from mapweave_protocol.link.turns import Turns
+from mapweave_protocol.link.guard.refusals import Refusals
+from mapweave_protocol.link.guard.turns import Turns
 from mapweave_protocol.wire.codec import MAX_PAYLOAD, decode
 from mapweave_protocol.wire.keys import (
     AGENT_QUERY,
@@ -115,7 +115,7 @@ class Inbox:
         self.add(Arrival(str(sample.key_expr), payload, gone))
 
     def add(self, arrival: Arrival) -> None:
-        """Take in `arrival`."""
+        """Take in `arrival`, in any thread."""
         with self._changed:
             sender = sender_of(arrival.key)
             if sender not in self._queues:

@@ -28,6 +28,8 @@ ENCRYPTED_ENDPOINT = "tls/localhost:7447"
 ENDPOINT_VARIABLE = "MAPWEAVE_CONNECT"
 ATTEMPT = 1.0  # [s] one attempt to connect; between attempts, Ctrl-C is heard
 PAUSE = 0.2  # [s] between attempts
+# Also after a long outage the link is back soon after the router can be reached.
+RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2}
 LEASE = 5.0  # [s] after which a robot that fell silent counts as gone
 HEARTBEAT = 0.5  # [s] after which the loss of a publisher's last sample is noticed
 
@@ -65,6 +67,7 @@ def session_config(
         "connect/endpoints": list(endpoints),
         "connect/timeout_ms": int(ATTEMPT * 1000),
         "connect/exit_on_failure": True,
+        "connect/retry": RETRY,
     }
     return _config(settings, endpoints, link)
 
@@ -79,7 +82,7 @@ def router_config(
     link
         With keys, only members of the team are let in, each to what is its own.
     connect
-        Endpoints of other routers.
+        Where other routers listen: who is at any of them reaches who is at another.
 
     Raises
     ------
@@ -93,12 +96,14 @@ def router_config(
         "mode": "router",
         "listen/endpoints": list(listen),
         "listen/exit_on_failure": True,
+        "connect/endpoints": list(connect),
+        "connect/timeout_ms": -1,  # tried for ever, beside what it does
+        "connect/exit_on_failure": False,
+        "connect/retry": RETRY,
         "scouting/delay": 0,
         # With the defaults, 100 idle connections keep newcomers out for 11 s.
         "transport/unicast/accept_timeout": 1000,
         "transport/unicast/accept_pending": 500,
-        "connect/endpoints": list(connect),
-        "connect/exit_on_failure": False,
     }
     if link.keys is not None:
         settings["access_control"] = access_rules(link.keys.roster)

@@ -15,6 +15,7 @@ from rich.text import Text
 
 from mapweave.cli import EXIT_FAILED, Command, argument, positive
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.guard.refusals import Refusals
 from mapweave_protocol.link.inbox import (
     Arrival,
     Inbox,
@@ -23,7 +24,6 @@ from mapweave_protocol.link.inbox import (
     read_presence,
     status_reader,
 )
-from mapweave_protocol.link.refusals import Refusals
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.keys import COORDINATOR_LIVE, JOINT_STATUS, LIVE, STATUS
 from mapweave_protocol.wire.messages import JointStatusMessage, StatusMessage

@@ -21,6 +21,8 @@ from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.asking import ask_joint_maps
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
+from mapweave_protocol.link.guard.refusals import Refusals
+from mapweave_protocol.link.guard.strangers import Strangers
 from mapweave_protocol.link.inbox import (
     Arrival,
     Inbox,
@@ -32,10 +34,8 @@ from mapweave_protocol.link.inbox import (
     read_presence,
     status_reader,
 )
-from mapweave_protocol.link.refusals import Refusals
 from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import declare_subscriber, open_session
-from mapweave_protocol.link.strangers import Strangers
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.narration.story_coverage import CoverageStory
 from mapweave_protocol.narration.story_joint import tell_components
@@ -220,4 +220,9 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("Show what a team does, as it happens.", _configure, _run)
+command = Command(
+    "Show what a team does, as it happens.",
+    _configure,
+    _run,
+    "--team rescue --connect tcp/192.168.1.10:7447",
+)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mapweave_protocol.link.refusals import INTERVAL, MOST_SENDERS, OTHERS, Refusals
+from mapweave_protocol.link.guard.refusals import INTERVAL, MOST_SENDERS, OTHERS, Refusals
 
 
 class Clock:
