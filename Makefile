@@ -12,7 +12,7 @@ SOURCES := pyproject.toml README.md LICENSE \
 TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
 
 .PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
-.PHONY: bench-speed bench-faults
+.PHONY: bench-speed bench-faults bench-live
 .PHONY: clean distclean mutations
 
 $(STAMP): pyproject.toml
@@ -83,6 +83,9 @@ docs: $(KERNELS)
 bench-map: $(KERNELS)
 	$(BIN)/python -m benchmarks map
 	$(BIN)/python -m benchmarks kidnap
+
+bench-live: $(KERNELS)
+	$(BIN)/python -m benchmarks live --seconds 600
 
 bench-speed: $(KERNELS)
 	$(BIN)/python -m benchmarks speed

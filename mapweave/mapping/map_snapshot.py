@@ -4,13 +4,22 @@ Drawing the lines of a growing submap takes longer than a scan does.
 """
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import TypeAlias
 
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.maps import LineMap, MadeWith, RobotMap, Submap
 from mapweave.marks import Mark
+
+Draw: TypeAlias = Callable[[bytes], LineMap]
+"""Draws the lines of a builder, which is pickled: here or in another process."""
+
+
+def draw_here(builder: bytes) -> LineMap:
+    """Return the lines of a builder."""
+    unpacked: SubmapBuilder = pickle.loads(builder)  # our own, of a moment ago
+    return unpacked.line_map()
 
 
 class Unsettled:
@@ -18,18 +27,23 @@ class Unsettled:
 
     def __init__(self, builder: SubmapBuilder) -> None:
         self._builder = builder
+        self._walls: LineMap | None = None
 
-    @cached_property
-    def walls(self) -> LineMap:
-        """Its lines as they were tracked."""
-        return self._builder.line_map()
+    def walls(self, draw: Draw | None = None) -> LineMap:
+        """Return its lines as they were tracked, drawn once: by `draw`, or as they are."""
+        if self._walls is None:
+            builder = self._builder
+            self._walls = builder.line_map() if draw is None else draw(MapSnapshot.packed(builder))
+        return self._walls
 
 
-def with_walls(submaps: Sequence[Submap], unsettled: Unsettled | None) -> list[Submap]:
+def with_walls(
+    submaps: Sequence[Submap], unsettled: Unsettled | None, draw: Draw | None = None
+) -> list[Submap]:
     """Return `submaps`, of the one that is being settled the walls, and not its outline."""
     if unsettled is None:
         return list(submaps)
-    return [*submaps[:-1], replace(submaps[-1], map=unsettled.walls)]
+    return [*submaps[:-1], replace(submaps[-1], map=unsettled.walls(draw))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +64,8 @@ class MapSnapshot:
         What builds it, pickled.
     marks
         Those of the map that the run goes on from.
+    draw
+        Draws lines.
     """
 
     robot: str
@@ -61,6 +77,7 @@ class MapSnapshot:
     growing: Submap | None
     builder: bytes
     marks: tuple[Mark, ...] = ()
+    draw: Draw = draw_here
 
     @classmethod
     def packed(cls, builder: SubmapBuilder) -> bytes:
@@ -74,9 +91,8 @@ class MapSnapshot:
 
     def robot_map(self) -> RobotMap:
         """Draw the map."""
-        submaps = with_walls(self.finished, self.unsettled)
+        submaps = with_walls(self.finished, self.unsettled, self.draw)
         if self.growing is not None:
-            builder: SubmapBuilder = pickle.loads(self.builder)  # our own, of a moment ago
-            submaps.append(replace(self.growing, map=builder.line_map()))
+            submaps.append(replace(self.growing, map=self.draw(self.builder)))
         made_with, marks = self.made_with, self.marks
         return RobotMap(self.robot, self.boot, self.version, tuple(submaps), made_with, marks)

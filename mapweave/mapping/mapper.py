@@ -17,7 +17,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
 from mapweave.mapping.continuation import first_component, marks_to_continue, scans_in, to_continue
-from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
+from mapweave.mapping.map_snapshot import Draw, MapSnapshot, Unsettled, draw_here, with_walls
 from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
@@ -85,6 +85,8 @@ class Mapper:
         A map to go on from: its submaps come first, and the run is joined to them by shape, as a
         robot's own components are. Scans that are counted from 0 again are counted on. A backend
         that is given must know the same.
+    draw
+        Draws the lines of snapshots, where these are drawn.
     """
 
     def __init__(
@@ -98,6 +100,7 @@ class Mapper:
         live: bool = False,
         on_warning: Callable[[str], None] | None = None,
         known: RobotMap | None = None,
+        draw: Draw = draw_here,
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
@@ -122,6 +125,7 @@ class Mapper:
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         self._backend = backend or Backend(self.parameters.backend, self._finished)
         self._live = live
+        self._draw = draw
         self._unsettled: Unsettled | None = None  # the last finished submap, while it is settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
@@ -196,6 +200,7 @@ class Mapper:
             None if empty else self._submap(LineMap.empty()),
             b"" if empty else MapSnapshot.packed(self._growing),
             self._marks,
+            self._draw,
         )
 
     @property

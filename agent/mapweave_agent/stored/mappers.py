@@ -9,9 +9,11 @@ from mapweave.config import Config
 from mapweave.mapping.continuation import to_continue
 from mapweave.mapping.localization.localizer import Localizer
 from mapweave.mapping.localization.place_finder import PlaceFinderParameters
+from mapweave.mapping.map_snapshot import Draw, draw_here
 from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave_agent.backend_process import BackendProcess
+from mapweave_agent.live.drawing_process import DrawingProcess
 from mapweave_agent.stored.place_process import PlaceProcess
 
 _log = logging.getLogger(__name__)
@@ -36,7 +38,10 @@ def mapper_of(
             )
         return
     parameters = MapperParameters.of(config)
-    with BackendProcess(parameters.backend, to_continue(start.known)) as backend:
+    with (
+        BackendProcess(parameters.backend, to_continue(start.known)) as backend,
+        _drawing(live=live) as draw,
+    ):
         yield Mapper(
             robot,
             boot,
@@ -46,4 +51,15 @@ def mapper_of(
             live=live,
             on_warning=_log.warning,
             known=start.known,
+            draw=draw,
         )
+
+
+@contextmanager
+def _drawing(*, live: bool) -> Iterator[Draw]:
+    """Give a block what draws maps: beside tracking, where scans do not wait."""
+    if not live:
+        yield draw_here
+        return
+    with DrawingProcess() as drawing:
+        yield drawing.draw
