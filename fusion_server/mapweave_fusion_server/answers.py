@@ -27,10 +27,16 @@ def answer(store: Store, parameters: str) -> Iterator[bytes]:
         If what is asked for is not there.
     """
     query = JointQuery.parse(parameters)
-    if query.since is not None:
+    if query.of is not None:
+        yield from (
+            store.maps_since(query.since)
+            if query.of == "maps"
+            else (store.alignments_since(query.since))
+        )
+    elif query.since is not None:
         yield from islice(store.versions_since(query.since), query.limit)
     elif query.robot is not None:
-        yield _found(store.map_of(query.robot), f"no map of robot {query.robot}")
+        yield _found(store.map_of(query.robot, query.boot), f"no map of robot {query.robot}")
     elif query.component is not None:
         robot, number = parse_component(query.component)
         held = store.map_with_component(robot, number)

@@ -21,6 +21,7 @@ from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
 from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
+from mapweave.mapping.tracking.deskewing import Deskewer
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
 from mapweave.mapping.tracking.pose_covariance import (
     EXACT,
@@ -115,6 +116,7 @@ class Mapper:
         # Raw scans so far, as long as no submap is finished.
         self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._tracker = Tracker(self.parameters.tracker)
+        self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
@@ -219,8 +221,11 @@ class Mapper:
         """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
         if not self._has_finished:
             self._early.append(scan)
-        seen = self.seen = observe(self._body.without(scan), self.parameters.observation)
+        straight = self._deskewer.straight(self._body.without(scan))
+        seen = self.seen = observe(straight, self.parameters.observation)
         placed = self._place(seen)
+        if placed:
+            self._deskewer.placed(straight.stamp, self._tracker.pose)
         if len(self._tracker.missed) < self._patience(seen):
             return placed, False
         self._start_again()
@@ -246,6 +251,7 @@ class Mapper:
         early = list(self._early)
         self._early.clear()
         self._tracker = Tracker(self.parameters.tracker)
+        self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin = self._frame = se2.IDENTITY
         self._merged = {}
@@ -273,7 +279,8 @@ class Mapper:
     def _whereabouts(self) -> tuple[FloatArray, FloatArray]:
         """Return (3,) where the last scan was placed and (4,) how surely, component frame."""
         turned = turn_uncertainty(self._held, self._origin[2])
-        return se2.compose(self._origin, self._tracker.pose), turned
+        at_stamp = se2.compose(self._tracker.pose, self._deskewer.to_stamp)
+        return se2.compose(self._origin, at_stamp), turned
 
     def _merge_all(self, found: Found) -> None:
         for seen, tracked in found:
@@ -300,6 +307,7 @@ class Mapper:
             self._component = self._newest_component = self._spare() + (self._unsettled is not None)
         self._follows = False
         self._tracker = self._tracker.afresh()
+        self._deskewer = Deskewer()
         self._origin = self._frame = se2.IDENTITY
         for seen in waiting:
             self._place(seen)

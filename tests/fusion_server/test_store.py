@@ -153,6 +153,22 @@ def test_a_store_has_one_server(path: Path) -> None:
         Store(path, "rescue")
 
 
+def test_who_says_since_which_version_gets_what_that_has_not(tmp_path: Path) -> None:
+    with Store(tmp_path / "store.sqlite", "t") as store:
+        store.keep_map(("a", "x"), 0, 0.0, b"a")
+        store.add_alignments(("a@x", "b@x"), 0.0, b"ab")
+        store.add_version(1, 0.0, b"1")
+        store.keep_map(("b", "x"), 0, 0.0, b"b")
+        store.add_alignments(("a@x", "c@x"), 0.0, b"ac")
+        store.renew_alignments(("b@x", "a@x"), b"AB")  # says the same: no news
+        assert store.maps_since(None) == store.maps_since(0) == [b"a", b"b"]
+        assert store.maps_since(1) == [b"b"]
+        assert store.alignments_since(None) == [b"AB", b"ac"]
+        assert store.alignments_since(1) == [b"ac"]
+        assert store.map_of("a", "x") == b"a"
+        assert store.map_of("a", "y") is None
+
+
 def test_marks_and_orders_are_remembered_and_are_news(tmp_path: Path) -> None:
     with Store(tmp_path / "store.sqlite", "rescue") as store:
         store.add_version(1, 1.0, b"version")

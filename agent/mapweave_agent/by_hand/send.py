@@ -107,4 +107,6 @@ def _named(own: RobotMap) -> str:
     return ", ".join(component_name(own.robot, component) for component in own.components)
 
 
-command = Command("Deliver a finished map to a team, as a robot's run.", _configure, _run)
+command = Command(
+    "Deliver a finished map to a team, as a robot's run.", _configure, _run, "r1.json --team rescue"
+)

@@ -1,6 +1,5 @@
 """A stored map as a robot is to find itself in: components of lines, each in a frame of its own."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +20,7 @@ class KnownMap:
     submaps
         As they were stored, without the paths of those who mapped them; ids from 0.
     marks
-        What was marked in it, each held by a submap.
+        On them, held by submaps.
     """
 
     submaps: tuple[Submap, ...]
@@ -36,13 +35,19 @@ class KnownMap:
         """
         if isinstance(stored, RobotMap):
             found = [(s.component, s.pose, s.map) for s in stored.submaps]
+            marks = _marks_of_robot(stored)
         else:
             found = [(k, np.zeros(3), c.map) for k, c in enumerate(stored.components)]
+            marks = [
+                held_by_submap(mark, k, mark.position)
+                for k, component in enumerate(stored.components)
+                for mark in component.marks
+            ]
         submaps = tuple(
             Submap(number, component, pose, lines, Trajectory.empty())
             for number, (component, pose, lines) in enumerate(found)
         )
-        return cls(submaps, tuple(_marks(stored)))
+        return cls(submaps, tuple(marks))
 
     @property
     def components(self) -> dict[int, LineMap]:
@@ -51,21 +56,17 @@ class KnownMap:
         return {k: lines_of(s for s in self.submaps if s.component == k) for k in numbers}
 
 
-def _marks(stored: RobotMap | JointMap) -> Iterator[Mark]:
-    """Yield the marks of a stored map where they lie in the frame of a submap of the known one."""
-    if isinstance(stored, JointMap):
-        for number, component in enumerate(stored.components):
-            for placed in component.marks:
-                yield _held(placed, number, placed.position)
-        return
-    number_of = {submap.id: number for number, submap in enumerate(stored.submaps)}
-    for mark in stored.marks:
-        found = find(stored.submaps, mark.anchor)
-        if found is not None:
-            submap, pose = found
-            yield _held(mark, number_of[submap.id], se2.transform_points(pose, mark.position))
+def held_by_submap(mark: Mark | PlacedMark, submap: int, position: FloatArray) -> Mark:
+    """Return `mark` at `position` (2,) [m] in the frame of a submap, which holds it."""
+    return Mark(mark.id, mark.label, mark.by, mark.time, Anchor(submap, None), position)
 
 
-def _held(said: Mark | PlacedMark, number: int, place: FloatArray) -> Mark:
-    """Return a mark at (2,) `place` [m] in the frame of submap `number`."""
-    return Mark(said.id, said.label, said.by, said.time, Anchor(number, None), place)
+def _marks_of_robot(stored: RobotMap) -> list[Mark]:
+    """Return the marks of a robot's map, its submaps counted from 0, without their scans."""
+    numbers = {submap.id: k for k, submap in enumerate(stored.submaps)}
+    found = ((mark, find(stored.submaps, mark.anchor)) for mark in stored.marks)
+    return [
+        held_by_submap(mark, numbers[held[0].id], se2.transform_points(held[1], mark.position))
+        for mark, held in found
+        if held is not None
+    ]

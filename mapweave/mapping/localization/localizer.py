@@ -185,9 +185,14 @@ class Localizer:
             located = [each.step for each in steps]
             for k in range(0, len(located), length):
                 submaps.append(_path(len(submaps), component, located[k : k + length]))
-        made_with, marks = self._made_with, self._known.marks
-        version = len(self._path)
-        return RobotMap(self.robot, self.boot, version, tuple(submaps), made_with, marks)
+        return RobotMap(
+            self.robot,
+            self.boot,
+            len(self._path),
+            tuple(submaps),
+            self._made_with,
+            self._known.marks,
+        )
 
     def snapshot(self) -> "LocalizedMap":
         """Return what `robot_map` would return now: it is drawn in a moment."""
