@@ -4,6 +4,8 @@ import http.client
 import json
 import re
 import signal
+import subprocess
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +21,13 @@ from mapweave_protocol.link.asking import ask_orders
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import ORDER
 from tests.fusion_server.by_hand.conftest import Operator, walk
-from tests.fusion_server.conftest import MakeAlignments, Network, ServerProcess, StartServer
+from tests.fusion_server.conftest import (
+    MAPWEAVE,
+    MakeAlignments,
+    Network,
+    ServerProcess,
+    StartServer,
+)
 
 START_A, START_B = (1.0, 1.0, 0.3), (3.0, 2.0, -2.0)
 A_TO_B = se2.between(START_A, START_B)
@@ -210,6 +218,35 @@ def test_what_a_robot_mapped_leaves_the_joint_map_by_an_order_only_and_comes_bac
     while joint.orders:
         joint = watcher.next()
     assert network.groups(joint) == [["a/0"], ["a/1"]]
+
+
+@pytest.mark.slow
+def test_who_watches_is_told_of_marks_and_orders(
+    network: Network, start_server: StartServer, anna: Operator, tmp_path: Path
+) -> None:
+    start_server()
+    watcher = network.watcher()
+    with network.robot("a") as a:
+        a.publish_map(walk("a", START_A))
+        watcher.next()
+    where = ["--team", network.team, "--connect", network.endpoint]
+    said = tmp_path / "said"
+    with said.open("w") as out, subprocess.Popen([MAPWEAVE, "watch", *where], stdout=out) as watch:
+        try:
+            _wait_for(said, "joint map 1")
+            anna.orders("mark", "a", "victim", "--at", "3")
+            _wait_for(said, "anna marks 'victim' at ")
+            anna.orders("forget", "a", "--reason", "driven by hand")
+            _wait_for(said, "anna forgets a@first: driven by hand")
+        finally:
+            watch.terminate()
+
+
+def _wait_for(file: Path, text: str) -> None:
+    deadline = time.monotonic() + Network.patience
+    while text not in file.read_text():
+        assert time.monotonic() < deadline, file.read_text()
+        time.sleep(0.1)
 
 
 def test_an_order_heard_twice_is_one_order(

@@ -20,6 +20,8 @@ def path(tmp_path: Path) -> Path:
         store.keep_map(("a", "x"), 0, 1.0, b"map of a" * 100)
         store.keep_map(("b", "y"), 0, 1.0, b"map of b" * 100)
         store.add_alignments(("a", "b"), 1.0, b"found" * 100)
+        store.keep_marks(("a", "x"), 1.0, b"marks of a")
+        store.add_order("o1", 1.0, b"an order")
     return path
 
 
@@ -72,6 +74,8 @@ def test_a_store_whose_pages_are_damaged_is_saved_as_far_as_it_can_be_read(
         assert len(kept) >= VERSIONS - 5
         assert all(store.version(n) == _message(n) for n in kept)
         assert store.last_maps() == [b"map of a" * 100, b"map of b" * 100]
+        assert store.last_marks() == [b"marks of a"]
+        assert store.orders() == [b"an order"]
         assert store.series != series, "the last versions may be among the lost ones"
         store.add_version(store.latest_version + 1, 0.0, b"the next one")
     [aside] = path.parent.glob("store.sqlite.damaged-*")
