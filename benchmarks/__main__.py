@@ -20,6 +20,7 @@ from benchmarks import (
     peers,
     reference,
     same_results,
+    shape,
     team,
     wire,
 )
@@ -49,6 +50,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "fusion": fusion,
     "reference": reference,
     "peers": peers,
+    "shape": shape,
     "same-results": same_results,
     "speed": speed,
     "team": team,

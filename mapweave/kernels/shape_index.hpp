@@ -25,42 +25,57 @@ struct Word {
   uint16_t baseline, first, second, apart;
 };
 
+// What a word that is found says: where the middle of the map that is looked for is in a map.
+struct Vote {
+  uint32_t slot;
+  int32_t x, y;
+  int16_t step, turn;
+  float place_x, place_y, weight;
+};
+
 struct Cell {
   uint64_t key;
   double votes, x, y, cosine, sine;
 };
 
-// Cells by their key, in a table for at most so many votes.
+// Cells of one map by their key: a table that is small enough to stay near, and is emptied by counting on.
 class Ballot {
  public:
-  explicit Ballot(size_t most) {
-    size_t size = 1 << 10;
-    while (size < 2 * most) size *= 2;
-    places_.assign(size, -1);
+  void clear(size_t votes) {
+    size_t size = 64;
+    while (size < 2 * votes) size *= 2;
+    if (size > places_.size()) places_.assign(size, 0), since_ = 0;
+    mask_ = size - 1;
+    since_ += cells.size();
+    cells.clear();
+    if (since_ < (1u << 30)) return;
+    std::fill(places_.begin(), places_.end(), 0);
+    since_ = 0;
   }
 
   const Cell* find(uint64_t key) const {
-    for (size_t at = spot(key);; at = (at + 1) & (places_.size() - 1)) {
-      if (places_[at] < 0) return nullptr;
-      if (cells[places_[at]].key == key) return &cells[places_[at]];
+    for (size_t at = spot(key);; at = (at + 1) & mask_) {
+      if (places_[at] <= since_) return nullptr;
+      if (cells[places_[at] - since_ - 1].key == key) return &cells[places_[at] - since_ - 1];
     }
   }
 
   Cell& at(uint64_t key) {
     size_t at = spot(key);
-    while (places_[at] >= 0 && cells[places_[at]].key != key) at = (at + 1) & (places_.size() - 1);
-    if (places_[at] < 0) {
-      places_[at] = static_cast<int32_t>(cells.size());
+    while (places_[at] > since_ && cells[places_[at] - since_ - 1].key != key) at = (at + 1) & mask_;
+    if (places_[at] <= since_) {
       cells.push_back({key, 0, 0, 0, 0, 0});
+      places_[at] = static_cast<uint32_t>(since_ + cells.size());
     }
-    return cells[places_[at]];
+    return cells[places_[at] - since_ - 1];
   }
 
   std::vector<Cell> cells;
 
  private:
-  size_t spot(uint64_t key) const { return (key * 0x9E3779B97F4A7C15ull >> 20) & (places_.size() - 1); }
-  std::vector<int32_t> places_;
+  size_t spot(uint64_t key) const { return (key * 0x9E3779B97F4A7C15ull >> 30) & mask_; }
+  std::vector<uint32_t> places_;
+  size_t since_ = 0, mask_ = 0;
 };
 
 class ShapeIndex {
@@ -79,6 +94,7 @@ class ShapeIndex {
           cell_turns > 2 && cell_turns <= 256 && longest > 0 && longest < 65))
       throw std::invalid_argument("bins above 0, margin in [0, 0.5), cell_turns in (2, 256], longest < 65 expected");
     buckets_.resize(static_cast<size_t>(lengths_) * turns_ * turns_ * 4);
+    held_.assign(buckets_.size(), 0);
     for (int k = 0; k < kSteps; ++k) {
       cosine_[k] = std::cos(kTurn * k / kSteps);
       sine_[k] = std::sin(kTurn * k / kSteps);
@@ -97,6 +113,7 @@ class ShapeIndex {
       const int64_t bucket = key(w.apart / bin_, bin(w.first - w.baseline), bin(w.second - w.baseline), kind(k));
       if (bucket < 0) continue;
       buckets_[bucket].push_back(w);
+      ++held_[bucket];
       ++held;
     }
     count_.push_back(held);
@@ -111,9 +128,12 @@ class ShapeIndex {
     alive_[slot] = false;
     dead_ += count_[slot];
     if (2 * dead_ <= total_) return;
-    for (auto& bucket : buckets_)
+    for (size_t k = 0; k < buckets_.size(); ++k) {
+      auto& bucket = buckets_[k];
       bucket.erase(std::remove_if(bucket.begin(), bucket.end(), [&](const Word& w) { return !alive_[w.slot]; }),
                    bucket.end());
+      held_[k] = static_cast<int32_t>(bucket.size());
+    }
     total_ -= dead_;
     dead_ = 0;
   }
@@ -125,13 +145,15 @@ class ShapeIndex {
                                                             double turn) const {
     if (static_cast<int64_t>(allowed.shape(0)) != size() || middle.shape(0) != 2 || count < 0 || budget < 0)
       throw std::invalid_argument("allowed (slots,), middle (2,), count and budget >= 0 expected");
-    Ballot ballot(static_cast<size_t>(budget) + 1);
+    std::vector<size_t> start(count_.size() + 1, 0);
+    votes_.clear();
     for (const auto& asked : rarest(words, kind, budget))
       for (int k = 0; k < asked.count; ++k)
         for (const Word& w : buckets_[asked.bucket[k]])
-          if (alive_[w.slot] && allowed(w.slot))
-            vote(k < asked.forward ? asked.word : reversed(asked.word), w, asked.weight, middle.data(), ballot);
-    return best(ballot, middle.data(), static_cast<size_t>(count), distance, turn);
+          if (allowed(w.slot) && alive_[w.slot])
+            vote(k < asked.forward ? asked.word : reversed(asked.word), w, asked.weight, middle.data(), start);
+    sort_by_slot(start);
+    return best(start, middle.data(), static_cast<size_t>(count), distance, turn);
   }
 
  private:
@@ -141,7 +163,7 @@ class ShapeIndex {
     double weight;
     int64_t found;
     int count, forward;
-    std::array<int64_t, 16> bucket;
+    std::array<int32_t, 16> bucket;
   };
 
   static size_t check(const In<double, 2>& words, const In<int64_t, 1>& kind) {
@@ -200,15 +222,16 @@ class ShapeIndex {
       if (!wanted) continue;
       const int64_t bucket = key(length + step[0], (first + step[1] + turns_) % turns_,
                                  (second + step[2] + turns_) % turns_, kind);
-      if (bucket < 0 || buckets_[bucket].empty()) continue;
-      asked.bucket[asked.count++] = bucket;
-      asked.found += static_cast<int64_t>(buckets_[bucket].size());
+      if (bucket < 0 || held_[bucket] == 0) continue;
+      asked.bucket[asked.count++] = static_cast<int32_t>(bucket);
+      asked.found += held_[bucket];
     }
   }
 
   // The words that are found least often, as long as all they find is within the budget.
   std::vector<Asked> rarest(const In<double, 2>& words, const In<int64_t, 1>& kind, int64_t budget) const {
     std::vector<Asked> all;
+    all.reserve(words.shape(0));
     for (size_t k = 0; k < check(words, kind); ++k) {
       Asked asked{};
       if (!packed(words.data() + 6 * k, 0, asked.word)) continue;
@@ -219,15 +242,21 @@ class ShapeIndex {
       asked.weight = std::log1p(static_cast<double>(total_) / static_cast<double>(asked.found));
       all.push_back(asked);
     }
-    std::stable_sort(all.begin(), all.end(), [](const Asked& a, const Asked& b) { return a.found < b.found; });
+    std::vector<std::pair<int64_t, size_t>> order(all.size());
+    for (size_t k = 0; k < all.size(); ++k) order[k] = {all[k].found, k};
+    std::sort(order.begin(), order.end());
+    std::vector<Asked> kept;
     int64_t sum = 0;
-    size_t kept = 0;
-    while (kept < all.size() && (sum += all[kept].found) <= budget) ++kept;
-    all.resize(kept);
-    return all;
+    for (const auto& [found, k] : order) {
+      if ((sum += found) > budget) break;
+      for (int n = 0; n < all[k].count; ++n) __builtin_prefetch(buckets_[all[k].bucket[n]].data());
+      kept.push_back(all[k]);
+    }
+    return kept;
   }
 
-  void vote(const Word& ours, const Word& theirs, double weight, const double* middle, Ballot& ballot) const {
+  void vote(const Word& ours, const Word& theirs, double weight, const double* middle,
+            std::vector<size_t>& start) const {
     if (std::abs(ours.apart - theirs.apart) > length_tolerance_) return;
     const int turned = static_cast<int16_t>(theirs.baseline - ours.baseline);
     const int one = static_cast<int16_t>(theirs.first - ours.first - turned);
@@ -239,15 +268,21 @@ class ShapeIndex {
     const double c = cosine_[step], s = sine_[step];
     const double dx = middle[0] - ours.x / 100.0, dy = middle[1] - ours.y / 100.0;
     const double x = theirs.x / 100.0 + c * dx - s * dy, y = theirs.y / 100.0 + s * dx + c * dy;
-    Cell& cell = ballot.at(cell_key(theirs.slot, floor_of(x), floor_of(y), step * cell_turns_ / kSteps));
-    cell.votes += weight;
-    cell.x += weight * x;
-    cell.y += weight * y;
-    cell.cosine += weight * c;
-    cell.sine += weight * s;
+    votes_.push_back({theirs.slot, floor_of(x), floor_of(y), static_cast<int16_t>(step),
+                     static_cast<int16_t>(step * cell_turns_ / kSteps), static_cast<float>(x), static_cast<float>(y),
+                     static_cast<float>(weight)});
+    ++start[theirs.slot + 1];
   }
 
-  int64_t floor_of(double x) const { return static_cast<int64_t>(std::floor(x / cell_)) + 32768; }
+  // Puts the votes for each map together, in their order; `start` becomes where each begins.
+  void sort_by_slot(std::vector<size_t>& start) const {
+    std::partial_sum(start.begin(), start.end(), start.begin());
+    sorted_.resize(votes_.size());
+    std::vector<size_t> next(start.begin(), start.end() - 1);
+    for (const Vote& vote : votes_) sorted_[next[vote.slot]++] = vote;
+  }
+
+  int32_t floor_of(double x) const { return static_cast<int32_t>(std::floor(x / cell_)) + 32768; }
 
   static uint64_t cell_key(uint64_t slot, int64_t x, int64_t y, int64_t turn) {
     return slot << 40 | (static_cast<uint64_t>(x) & 0xFFFF) << 24 | (static_cast<uint64_t>(y) & 0xFFFF) << 8 |
@@ -255,14 +290,14 @@ class ShapeIndex {
   }
 
   // A cell together with those beside it.
-  Cell gathered(const Ballot& ballot, const Cell& of) const {
-    Cell sum{of.key, 0, 0, 0, 0, 0};
-    const uint64_t slot = of.key >> 40;
-    const int64_t x = of.key >> 24 & 0xFFFF, y = of.key >> 8 & 0xFFFF, turn = of.key & 0xFF;
+  Cell gathered(uint64_t key) const {
+    Cell sum{key, 0, 0, 0, 0, 0};
+    const uint64_t slot = key >> 40;
+    const int64_t x = key >> 24 & 0xFFFF, y = key >> 8 & 0xFFFF, turn = key & 0xFF;
     for (int dx = -1; dx <= 1; ++dx)
       for (int dy = -1; dy <= 1; ++dy)
         for (int dt = -1; dt <= 1; ++dt) {
-          const Cell* near = ballot.find(cell_key(slot, x + dx, y + dy, (turn + dt + cell_turns_) % cell_turns_));
+          const Cell* near = ballot_.find(cell_key(slot, x + dx, y + dy, (turn + dt + cell_turns_) % cell_turns_));
           if (!near) continue;
           sum.votes += near->votes;
           sum.x += near->x;
@@ -273,14 +308,53 @@ class ShapeIndex {
     return sum;
   }
 
-  std::tuple<Out<int64_t>, Out<double>, Out<double>> best(Ballot& ballot, const double* middle, size_t count,
-                                                          double distance, double turn) const {
-    const auto before = [](const Cell& a, const Cell& b) { return a.votes != b.votes ? a.votes > b.votes : a.key < b.key; };
-    std::vector<Cell> leaders = ballot.cells;
-    const size_t most = std::min(leaders.size(), 4 * count);
-    std::partial_sort(leaders.begin(), leaders.begin() + most, leaders.end(), before);
-    leaders.resize(most);
-    for (Cell& cell : leaders) cell = gathered(ballot, cell);
+  // The cells that are the most voted by themselves, together with those beside them.
+  std::vector<Cell> led(const std::vector<size_t>& start, size_t most) const {
+    using Leader = std::pair<double, uint64_t>;
+    std::vector<Leader> heap;  // the least of them first
+    const auto weaker = [](const Leader& a, const Leader& b) {
+      return a.first != b.first ? a.first > b.first : a.second < b.second;
+    };
+    for (size_t slot = 0; slot + 1 < start.size(); ++slot) {
+      if (start[slot] == start[slot + 1]) continue;
+      count_votes(start, slot);
+      for (const Cell& cell : ballot_.cells) {
+        if (heap.size() == most && (most == 0 || !weaker({cell.votes, cell.key}, heap.front()))) continue;
+        if (heap.size() == most) std::pop_heap(heap.begin(), heap.end(), weaker), heap.pop_back();
+        heap.emplace_back(cell.votes, cell.key);
+        std::push_heap(heap.begin(), heap.end(), weaker);
+      }
+    }
+    std::sort(heap.begin(), heap.end(), [](const Leader& a, const Leader& b) { return a.second < b.second; });
+    std::vector<Cell> sums;
+    for (size_t k = 0; k < heap.size(); ++k) {
+      if (k == 0 || heap[k].second >> 40 != heap[k - 1].second >> 40) count_votes(start, heap[k].second >> 40);
+      sums.push_back(gathered(heap[k].second));
+    }
+    return sums;
+  }
+
+  // Counts the votes for one map.
+  void count_votes(const std::vector<size_t>& start, size_t slot) const {
+    ballot_.clear(start[slot + 1] - start[slot]);
+    for (size_t k = start[slot]; k < start[slot + 1]; ++k) count_vote(sorted_[k], ballot_);
+  }
+
+  void count_vote(const Vote& vote, Ballot& ballot) const {
+    Cell& cell = ballot.at(cell_key(vote.slot, vote.x, vote.y, vote.turn));
+    const double w = vote.weight;
+    cell.votes += w;
+    cell.x += w * vote.place_x;
+    cell.y += w * vote.place_y;
+    cell.cosine += w * cosine_[vote.step];
+    cell.sine += w * sine_[vote.step];
+  }
+
+  static bool before(const Cell& a, const Cell& b) { return a.votes != b.votes ? a.votes > b.votes : a.key < b.key; }
+
+  std::tuple<Out<int64_t>, Out<double>, Out<double>> best(const std::vector<size_t>& start, const double* middle,
+                                                          size_t count, double distance, double turn) const {
+    std::vector<Cell> leaders = led(start, 4 * count);
     std::sort(leaders.begin(), leaders.end(), before);
     std::vector<int64_t> slots;
     std::vector<double> transforms, votes;
@@ -308,9 +382,12 @@ class ShapeIndex {
   int length_tolerance_, turn_tolerance_;
   std::array<double, kSteps> cosine_, sine_;
   std::vector<std::vector<Word>> buckets_;
+  std::vector<int32_t> held_;  // words in each bucket, close together
   std::vector<int64_t> count_;
-  std::vector<bool> alive_;
+  std::vector<uint8_t> alive_;
   int64_t total_ = 0, dead_ = 0;
+  mutable std::vector<Vote> votes_, sorted_;  // of the last query: their room is used again
+  mutable Ballot ballot_;
 };
 
 }  // namespace shape_index

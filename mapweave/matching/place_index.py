@@ -35,15 +35,15 @@ class PlaceIndexParameters(StageParameters):
     """
 
     words: WordParameters = WordParameters()
-    length_bin: float = Field(0.2, gt=0, description="[m] in one bucket")
-    turn_bins: int = Field(30, ge=3, description="of a turn, in one bucket: 12°")
+    length_bin: float = Field(0.15, gt=0, description="[m] in one bucket")
+    turn_bins: int = Field(36, ge=3, description="of a turn, in one bucket: 10°")
     margin: float = Field(0.3, ge=0, lt=0.5, description="of a bin, to look in the next as well")
-    length_tolerance: float = Field(0.15, gt=0, description="[m] between words that are alike")
-    turn_tolerance: float = Field(0.14, gt=0, description="[rad] between those: 8°")
+    length_tolerance: float = Field(0.1, gt=0, description="[m] between words that are alike")
+    turn_tolerance: float = Field(0.09, gt=0, description="[rad] between those: 5°")
     cell: float = Field(0.25, gt=0, description="[m] that votes are counted in, thrice as wide")
     cell_turns: int = Field(90, ge=3, description="of a turn, likewise: 4°")
-    budget: int = Field(150_000, ge=1, description="words alike that are looked at, the rarest")
-    voted: int = Field(300, ge=1, description="places that are scored, the most voted")
+    budget: int = Field(30_000, ge=1, description="words alike that are looked at, the rarest")
+    voted: int = Field(80, ge=1, description="places that are scored, the most voted")
     distance: float = Field(0.35, gt=0, description="[m] between different places of one map")
     turn: float = Field(0.1, gt=0, description="[rad] between those: 6°")
     raster: DistanceFieldParameters = derived(
@@ -52,7 +52,7 @@ class PlaceIndexParameters(StageParameters):
     verification: VerificationParameters = derived(
         lambda c: VerificationParameters.of(c, contradiction_weight=2.0)
     )
-    samples: int = Field(80, ge=10, description="of a map's walls that a place is scored by")
+    samples: int = Field(60, ge=10, description="of a map's walls that a place is scored by")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

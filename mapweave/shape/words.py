@@ -1,4 +1,4 @@
-"""Shape words: what of a map is told whatever its position, and fixes a place (paper, VIII, H1, H2).
+"""Shape words: what of a map is told whatever its position, and fixes a place (paper, VIII).
 
 A word is a pair of wall ends with their relative pose: how far they are apart and, in tangent
 space, by how much the direction turns from the first wall to the line between the ends, and from

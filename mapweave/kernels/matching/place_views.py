@@ -83,5 +83,7 @@ def score_views(
     table
         (codes, directions) what a metre of wall counts in a cell of each code, by its direction.
     """
-    compute = score_views_numpy if COMPILED is None else COMPILED.score_views
-    return cast("FloatArray", compute(other, list(views), transforms, table))
+    if COMPILED is None:
+        twins = cast("list[PlaceViewNumpy]", [other, *views])
+        return score_views_numpy(twins[0], twins[1:], transforms, table)
+    return cast("FloatArray", COMPILED.score_views(other, list(views), transforms, table))

@@ -176,7 +176,7 @@ class ShapeIndexNumpy:
         words, buckets = [], []
         for m in range(8):
             asked = [(m >> k & 1) * side[k] for k in range(3)]
-            wanted = np.all([~(m >> k & 1 == 1) | (side[k] != 0) for k in range(3)], axis=0)
+            wanted = np.all([(side[k] != 0) | (not m >> k & 1) for k in range(3)], axis=0)
             key = self._key(bins[0] + asked[0], bins[1] + asked[1], bins[2] + asked[2], kind)
             words.append(np.flatnonzero(wanted & (key >= 0)))
             buckets.append(key[words[-1]])
