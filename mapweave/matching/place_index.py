@@ -47,7 +47,9 @@ class PlaceIndexParameters(StageParameters):
     distance: float = Field(0.35, gt=0, description="[m] between different places of one map")
     turn: float = Field(0.1, gt=0, description="[rad] between those: 6°")
     raster: DistanceFieldParameters = derived(
-        lambda c: DistanceFieldParameters.of(c, cell=2 * c.mapping.resolution, same_wall=0.5)
+        lambda c: DistanceFieldParameters.of(
+            c, cell=2 * c.mapping.resolution, same_wall=0.5, max_cells=250_000
+        )
     )
     verification: VerificationParameters = derived(
         lambda c: VerificationParameters.of(c, contradiction_weight=2.0)
