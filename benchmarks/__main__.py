@@ -22,6 +22,7 @@ from benchmarks import (
     same_results,
     shape,
     team,
+    twins,
     wire,
 )
 from benchmarks.faults import kills, lossy, outages
@@ -54,6 +55,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "same-results": same_results,
     "speed": speed,
     "team": team,
+    "twins": twins,
     "confidence": fit_confidence,
     "wire": wire,
     "outages": outages,
