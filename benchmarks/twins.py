@@ -89,7 +89,7 @@ def run(options: argparse.Namespace) -> None:
 def _row(name: str, visits: int, seed: int, scene: Scene) -> dict[str, object]:
     found = max(align(scene.first, scene.second, _PARAMETERS), key=lambda a: a.confidence)
     joined = found.decision == "accepted"
-    right = joined and scene.transform is not None and _right(found, scene)
+    right = joined and _right(found, scene)
     return {
         "scene": name,
         "visits": visits,
@@ -104,10 +104,12 @@ def _row(name: str, visits: int, seed: int, scene: Scene) -> dict[str, object]:
 
 
 def _right(found: Alignment, scene: Scene) -> bool:
-    middle = scene.second.lines(0).segments.reshape(-1, 2).mean(axis=0)
     true = scene.transform
+    if true is None:
+        return False
+    middle = scene.second.lines(0).segments.reshape(-1, 2).mean(axis=0)
     apart = se2.transform_points(found.transform, middle) - se2.transform_points(true, middle)
-    turn = float(np.abs(se2.wrap(found.transform[2] - true[2]))) if true is not None else np.pi
+    turn = float(np.abs(se2.wrap(found.transform[2] - true[2])))
     return is_right(float(np.hypot(*apart)), turn)
 
 
