@@ -20,7 +20,9 @@ from benchmarks import (
     peers,
     reference,
     same_results,
+    shape,
     team,
+    twins,
     wire,
 )
 from benchmarks.faults import hostile, kills, lossy, outages
@@ -49,9 +51,11 @@ BENCHMARKS: dict[str, Benchmark] = {
     "fusion": fusion,
     "reference": reference,
     "peers": peers,
+    "shape": shape,
     "same-results": same_results,
     "speed": speed,
     "team": team,
+    "twins": twins,
     "confidence": fit_confidence,
     "wire": wire,
     "hostile": hostile,

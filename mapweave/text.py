@@ -21,8 +21,8 @@ _SENTENCES = {
     ReasonKind.PARALLEL: "{match}; nearly all of it parallel, so one may slide along the other",
     ReasonKind.STRAIGHT: "{match}; but only straight walls, no shape that tells places apart",
     ReasonKind.RIVAL: "{match}; but {elsewhere} fits as well, with {rival_match}",
-    ReasonKind.ONE_ROOM: "{match}; all but {outside:.0f} m of it in one room: the same room may"
-    " exist twice ({sure})",
+    ReasonKind.ONE_ROOM: "{match}; without one room {outside:.0f} m of it tell the place: the same"
+    " room may exist twice ({sure})",
     ReasonKind.UNSURE: "{match}; {next_best}; too little to be sure of the place ({sure})",
     ReasonKind.CONVINCING: "{match}; {next_best}",
     ReasonKind.PARTS_AGREE: "{parts:.0f} pairs of parts agree within {spread:.1f} m; the best held:"

@@ -7,6 +7,7 @@ from itertools import combinations
 from typing import TypeAlias
 
 from mapweave.maps import Alignment, RobotMap
+from mapweave.matching.encounters import Encounters
 from mapweave.team.hysteresis import joins
 from mapweave_agent.comparing.team_maps import JoinedRuns, TeamMaps
 from mapweave_agent.publication_schedule import AgentParameters
@@ -47,6 +48,8 @@ class _Pair:
         What another one found out last.
     rests_until
         While they still map, the pair is not compared before.
+    waits_since
+        When it was due and others may have gone first; None while it is not.
     """
 
     compared: tuple[MapVersion, MapVersion] | None = None
@@ -54,13 +57,15 @@ class _Pair:
     met: bool = False
     learned: AlignmentMessage | None = None
     rests_until: float = field(default=0.0)
+    waits_since: float | None = None
 
 
 class ComparisonSchedule:
     """Which pair to compare next: always of the newest maps, and in the end of the last ones.
 
     Maps of runs that are over never change: each is compared with what may show its place until
-    the joint map has it there.
+    the joint map has it there. Those whose shapes say that they saw one place come first; no other
+    waits for ever.
 
     Parameters
     ----------
@@ -79,12 +84,14 @@ class ComparisonSchedule:
         self._wanted: list[MapVersion] = []
         self._lacking = Lacking()
         self._pairs: dict[PairOfRuns, _Pair] = {}
+        self._encounters = Encounters(robot)
         self._quiet_until = -math.inf
 
     def own_map(self, robot_map: RobotMap, *, finished: bool) -> None:
         """Take in this robot's map as published; `finished` says that it is the last."""
         self._own = robot_map
         self._own_finished = finished
+        self._encounters.take(robot_map)
         self._wake()
 
     def earlier_map(self, robot_map: RobotMap) -> None:
@@ -96,6 +103,7 @@ class ComparisonSchedule:
         """Take in the map of a run of a peer, or of another process with this robot's id."""
         if robot_map.robot != self._robot or robot_map.boot not in self._own_boots:
             self._team.take(robot_map)
+            self._encounters.take(robot_map)
             self._wake()
 
     @property
@@ -146,9 +154,10 @@ class ComparisonSchedule:
         self._wake()
 
     def begin(self, now: float) -> Comparison | None:
-        """Return the next comparison, None if none is due; of several, the one due longest.
+        """Return the next comparison, None if none is due.
 
-        Those of runs that are over come last: what they are like does not change.
+        Those of runs that are over come last: what they are like does not change. Before them, and
+        of each kind, those come first whose shapes speak for it; of several the one due longest.
         """
         if self._own is None or now < self._quiet_until:
             return None
@@ -157,7 +166,8 @@ class ComparisonSchedule:
         if not due:
             self._quiet_until = min((since for _, since, _ in ours), default=math.inf)
             return None
-        own, other = min(due, key=lambda each: each[:2])[2]
+        ranked = [(over, self._lets_others_go(*pair, now), since) for over, since, pair in due]
+        own, other = due[ranked.index(min(ranked))][2]
         first, _ = ordered(own.robot, other.robot)
         return Comparison(other.robot, *((own, other) if own.robot == first else (other, own)))
 
@@ -179,7 +189,7 @@ class ComparisonSchedule:
         pair.met |= joins(found)
         pair.learned = None
         rest = max(self._parameters.comparison_interval, took * self._parameters.comparison_rest)
-        pair.rests_until = now + rest
+        pair.rests_until, pair.waits_since = now + rest, None
         self._wake()
 
     @property
@@ -257,6 +267,15 @@ class ComparisonSchedule:
         ours_last = self._own_finished or own is not self._own
         both_last = ours_last and (other.boot in self._earlier or self._team.is_last(other))
         return both_last or now >= rests_until
+
+    def _lets_others_go(self, own: RobotMap, other: RobotMap, now: float) -> bool:
+        """Tell whether a pair that is due waits as long as there are others."""
+        pair = self._pair(own, other)
+        if pair.waits_since is None:
+            pair.waits_since = now
+        patient = now - pair.waits_since < self._parameters.comparison_patience
+        likely = own is not self._own or self._encounters.likely(other.robot, other.boot)
+        return patient and not likely
 
     def _note_compared(self, ends: tuple[MapVersion, MapVersion]) -> None:
         pair = self._pair(*ends)

@@ -23,6 +23,12 @@ class AgentParameters(BaseModel):
     comparison_rest: float = Field(
         2.0, ge=0, description="times as long as a comparison took, its pair rests while it maps"
     )
+    comparison_patience: float = Field(
+        60.0,
+        ge=0,
+        description="[s] that a pair whose shapes do not say that both saw one place lets others"
+        " go first",
+    )
     status_interval: float = Field(1.0, gt=0, description="[s] between statuses, as designed")
 
 

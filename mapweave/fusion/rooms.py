@@ -1,7 +1,8 @@
 """Rooms: whether two maps agree about more than one room.
 
 Rooms are built alike. Two maps that agree about all of one closed room agree about one thing,
-however often it was driven through: the room may exist twice, and only what lies outside tells.
+however often it was driven through: the room may exist twice, and only what lies outside tells. A
+plain corridor before it does not: it fits before every door.
 """
 
 import math
@@ -37,6 +38,12 @@ class RoomParameters(BaseModel):
     min_outside: float = Field(
         4.0, ge=0, description="[m] of wall in common outside of the room that tell which it is"
     )
+    one_way: float = Field(
+        8.0,
+        gt=0,
+        description="metres that count for each that holds the weakest direction: a plain corridor"
+        " before a room is as common as the room, and does not tell where along it that is",
+    )
     unique: float = Field(
         0.8, gt=0, le=1, description="probability that a room has no twin within reach of the team"
     )
@@ -49,12 +56,12 @@ def outside(
     verification: VerificationParameters,
     parameters: RoomParameters,
 ) -> float:
-    """Return the metres of wall in common that lie outside of one room.
+    """Return the metres of wall in common that tell the place when one room is left out.
 
-    Infinite where what most of it is in is no room, but a corridor or a hall, by either map: the
-    other may have seen a part of it. Otherwise the less counts, for one of them may have seen more
-    through the door. A map that knows of no free space as wide as a passage tells of no room: the
-    other one decides, and where neither tells, how far the wall in common spreads.
+    That room without which the least is left, by either map: one of them may have seen more through
+    the door. Infinite where that is no room, but a corridor or a hall, by one of them: the other
+    may have seen a part of it. A map that knows of no free space as wide as a passage tells of
+    no room: the other one decides, and where neither tells, how far the wall in common spreads.
 
     Parameters
     ----------
@@ -89,15 +96,25 @@ def _outside(
     if len(extents) == 0:
         return None
     shared = coinciding(reference, other, transform, verification)
-    walls = other.oriented.at(shared).moved(transform)
+    walls, weight = other.oriented.at(shared).moved(transform), other.weight[shared]
     # A wall is of the room that it faces.
     before = walls.points + p.passage * walls.normals
     cell = p.coarse * reference.cell
     index = np.floor((before - reference.origin) / cell).astype(np.int64)
     i, j = np.clip(index, 0, np.array(nearest.shape) - 1).T
-    inside = np.bincount(nearest[i, j], other.weight[shared], len(extents))
-    most = int(np.argmax(inside))
-    return float(inside.sum() - inside[most]) if extents[most] <= p.max_extent else math.inf
+    room = nearest[i, j]
+    known = np.unique(room)
+    if len(known) == 0:
+        return 0.0
+    left = [_telling(walls.normals, weight * (room != k), p) for k in known]
+    decisive = int(np.argmin(left))
+    return left[decisive] if extents[known[decisive]] <= p.max_extent else math.inf
+
+
+def _telling(normals: FloatArray, weight: FloatArray, p: RoomParameters) -> float:
+    """[m] of wall, no more than `one_way` times what holds the weakest direction of it."""
+    held = np.linalg.eigvalsh((normals * weight[:, None]).T @ normals)[0]
+    return float(min(weight.sum(), p.one_way * max(held, 0.0)))
 
 
 def _longer_side(points: FloatArray) -> float:

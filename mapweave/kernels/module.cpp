@@ -10,6 +10,7 @@
 #include "marks.hpp"
 #include "merging.hpp"
 #include "multiview.hpp"
+#include "place_views.hpp"
 #include "point_map.hpp"
 #include "polygons.hpp"
 #include "polylines.hpp"
@@ -19,6 +20,7 @@
 #include "rasters.hpp"
 #include "scores.hpp"
 #include "segmentation.hpp"
+#include "shape_index.hpp"
 #include "slivers.hpp"
 #include "viewpoints.hpp"
 #include "windows.hpp"
@@ -36,6 +38,7 @@ NB_MODULE(_compiled, m) {
   bind_marks(m);
   bind_merging(m);
   bind_multiview(m);
+  bind_place_views(m);
   bind_point_map(m);
   bind_polygons(m);
   bind_polylines(m);
@@ -44,6 +47,7 @@ NB_MODULE(_compiled, m) {
   bind_rasters(m);
   bind_scores(m);
   bind_segmentation(m);
+  bind_shape_index(m);
   bind_slivers(m);
   bind_viewpoints(m);
   bind_pose_evidence(m);  // of the points and viewpoints above

@@ -19,10 +19,13 @@ from mapweave_protocol.wire.messages import (
     MapVersion,
 )
 from mapweave_protocol.wire.pairs import responsible
+from tests.mapweave.buildings import BUILDING, part
 
 PARAMETERS = AgentParameters(comparison_interval=5.0, comparison_rest=2.0)
 FIRST = responsible("a", "b")
 SECOND = "b" if FIRST == "a" else "a"
+PEERS = [n for n in "stuvwxyz" if responsible("r", n) == "r"][:2]
+ELSEWHERE = part(np.array([[0.0, 0.0], [9.0, 0.0], [4.0, 7.0]]), -1.0, 20.0)  # no right angle
 
 
 def a_map(robot: str, version: int, boot: str = "x") -> RobotMap:
@@ -359,3 +362,43 @@ def test_what_a_robot_found_that_is_gone_is_told_in_our_name() -> None:
     assert second.orphans == []
     second.peer_gone(FIRST, "x")
     assert second.orphans == [found(comparison, SECOND)]
+
+
+def test_maps_whose_shapes_speak_of_one_place_are_compared_first() -> None:
+    plan, likely, _ = plan_among_strangers()
+    comparison = plan.begin(0.0)
+    assert comparison is not None
+    assert comparison.peer == likely
+
+
+def test_maps_whose_shapes_say_nothing_are_compared_once_they_have_waited() -> None:
+    plan, likely, unlikely = plan_among_strangers()
+    waited = PARAMETERS.comparison_patience
+    for turn in range(3):
+        comparison = plan.begin(turn * 0.1)
+        assert comparison is not None
+        assert comparison.peer == likely
+        plan.peer_map(seen_by(likely, part(BUILDING, 4.0, 16.0), version=2 + turn))
+    later = plan.begin(waited)
+    assert later is not None
+    plan.done(later, waited, 0.1)
+    after = plan.begin(waited)
+    assert after is not None
+    assert {later.peer, after.peer} == {likely, unlikely}
+
+
+def seen_by(robot: str, lines: LineMap, version: int = 1) -> RobotMap:
+    submap = Submap(0, 0, np.zeros(3), lines, Trajectory.empty())
+    return RobotMap(robot, "x", version, (submap,))
+
+
+def plan_among_strangers() -> tuple[ComparisonSchedule, str, str]:
+    """Return a plan, a peer that saw what this robot saw, and one that comes before it by name."""
+    robot = "r"
+    unlikely, likely = (n for n in PEERS if responsible(robot, n) == robot)
+    plan = ComparisonSchedule(robot, PARAMETERS)
+    plan.own_map(seen_by(robot, part(BUILDING, 0.0, 14.0)), finished=False)
+    for peer, lines in ((unlikely, ELSEWHERE), (likely, part(BUILDING, 4.0, 16.0))):
+        plan.peer_here(peer, "x")
+        plan.peer_map(seen_by(peer, lines))
+    return plan, likely, unlikely

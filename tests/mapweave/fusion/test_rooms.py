@@ -122,6 +122,16 @@ def test_what_lies_outside_is_counted_from_both_maps() -> None:
     assert outside(two.raster, two.raster, *asked) > P.rooms.min_outside
 
 
+def test_a_plain_corridor_before_a_room_does_not_tell_which_room_it_is() -> None:
+    lines = inside(room(5.0, 6.0, 1.5, 3.0))
+    corridor = [[-6.0, -3.0, 11.0, -3.0], [3.0, -0.8, -6.0, -0.8], [11.0, -0.8, 3.9, -0.8]]
+    free = np.array([(-5.9, -2.85), (10.9, -2.85), (10.9, -0.95), (-5.9, -0.95)])
+    seen = line_map(np.vstack([lines.segments, corridor]), (*lines.free_space, free))
+    found = align_maps(("a/0", seen), ("b/0", seen.moved(np.array([3.0, 1.0, 2.0]))), P)
+    assert found.decision == "ambiguous"
+    assert found.confidence < 0.85
+
+
 def test_a_part_of_what_the_other_knows_to_be_a_corridor_is_no_room() -> None:
     hall, piece = prepare(part(BUILDING, 0, 30), P), prepare(part(BUILDING, 5, 12), P)
     assert hall is not None

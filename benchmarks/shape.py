@@ -1,0 +1,199 @@
+"""Shapes: how often a submap's right place is among the first that the index of shapes proposes.
+
+Submaps of stretches are looked up among those of all other stretches of their log, and of other
+buildings. Nothing else is asked: no correlation.
+"""
+
+import argparse
+import time
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from benchmarks.logs import find_logs, load_scans, load_truth
+from benchmarks.pairs import is_right
+from benchmarks.stretches import map_stretches
+from benchmarks.tables import OUTPUT, format_table, write_json
+from benchmarks.truth import Path2D, true_frame
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.maps import Submap
+from mapweave.matching.place_index import Place, PlaceIndex, PlaceShape
+from mapweave.scan.points import points_on_lines
+
+SHARED = 10.0  # [m] in common with a submap of another stretch, for one that is to be found
+GROUPS = (10.0, 15.0, 20.0, 30.0)  # [m] in common, at least
+FIRST = 5  # places that are looked at
+SPACING, NEAR = 0.15, 0.25  # [m] of points on walls; within which they are in common
+Key = tuple[str, int, int]  # building, stretch, number among all
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """A submap of a stretch, ready to be looked up.
+
+    Attributes
+    ----------
+    key
+        Its building, the stretch that it is of, and its number.
+    frame
+        (3,) of it in the log's corrected frame; NaN where that is not known.
+    walls
+        (m, 2) points along its walls in that frame, 0.15 m apart [m].
+    middle
+        (2,) of its walls, its own frame [m].
+    """
+
+    log: str
+    key: Key
+    frame: FloatArray
+    walls: FloatArray
+    middle: FloatArray
+    shape: PlaceShape
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Say which logs, how they are cut, and how many submaps there are."""
+    parser.add_argument("--logs", nargs="+", metavar="NAME", help="which logs (default all)")
+    parser.add_argument(
+        "--stretches", type=int, nargs="+", default=[6], metavar="N", help="a log is cut into (6)"
+    )
+    parser.add_argument(
+        "--submaps", type=int, default=1000, metavar="N", help="in the index, at most (1000)"
+    )
+    parser.add_argument("--output", type=Path, default=OUTPUT / "shape.json", help="%(default)s")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Look every submap up, print how many were found, write the rows."""
+    logs, rows = find_logs(options.logs), list[dict[str, object]]()
+    index: PlaceIndex[Key] = PlaceIndex()
+    samples = [
+        sample
+        for log in logs
+        for count in options.stretches
+        for sample in _samples(log.name, log.building, count, index)
+    ]
+    for log in logs:
+        for count in options.stretches:
+            rows += _look_up(log.name, count, samples, options.submaps)
+    write_json(options.output, rows)
+    print(tell(rows))
+
+
+def _samples(name: str, building: str, count: int, index: PlaceIndex[Key]) -> list[Sample]:
+    """Map a log in stretches; return all submaps with enough wall to have a shape."""
+    log = find_logs([name])[0]
+    truth = load_truth(log, np.array([scan.stamp for scan in load_scans(log)]))
+    submaps = [
+        (k, submap)
+        for k, stretch in enumerate(map_stretches(log, count))
+        for submap in stretch.robot_map.submaps
+        if len(submap.map.segments) > 2
+    ]
+    return [
+        _sample(f"{name}/{count}", (building, k, n), submap, truth, index)
+        for n, (k, submap) in enumerate(submaps)
+    ]
+
+
+def _sample(
+    log: str, key: Key, submap: Submap, truth: FloatArray, index: PlaceIndex[Key]
+) -> Sample:
+    path = Path2D(0, submap.trajectory.scan_index, submap.trajectory.pose)
+    frame = true_frame(path, truth)
+    walls = se2.transform_points(frame, points_on_lines(submap.map, SPACING)[0].points)
+    middle = submap.map.segments.reshape(-1, 2).mean(axis=0)
+    return Sample(log, key, frame, walls, middle, index.prepare(submap.map))
+
+
+def _look_up(
+    name: str, count: int, samples: Sequence[Sample], most: int
+) -> list[dict[str, object]]:
+    """Return a row for each submap of one log in so many stretches that is to be found."""
+    own = [s for s in samples if s.log == f"{name}/{count}"]
+    others = [s for s in samples if s.key[0] != own[0].key[0]]
+    drawn = np.random.default_rng(1).permutation(len(others))[: max(most - len(own), 0)]
+    index: PlaceIndex[Key] = PlaceIndex()
+    known: dict[Key, Sample] = {}
+    for number, sample in enumerate([*own, *(others[k] for k in drawn)]):
+        known[sample.key[0], sample.key[1], number] = sample
+        index.add((sample.key[0], sample.key[1], number), sample.shape)
+    rows = []
+    for sample in own:
+        shared = _most_shared(sample, own)
+        if shared >= SHARED:
+            rows.append(_row(sample, shared, index, known))
+    return rows
+
+
+def _most_shared(sample: Sample, own: Sequence[Sample]) -> float:
+    """[m] of wall in common with that submap of another stretch that shares most."""
+    if not np.isfinite(sample.frame[0]):
+        return 0.0
+    others = [s for s in own if s.key[1] != sample.key[1] and np.isfinite(s.frame[0])]
+    return max((_shared(sample.walls, s.walls) for s in others), default=0.0)
+
+
+def _shared(first: FloatArray, second: FloatArray) -> float:
+    """[m] of wall in common, the mean of both ways."""
+    apart = [
+        KDTree(b).query(a, distance_upper_bound=NEAR)[0]
+        for a, b in ((first, second), (second, first))
+    ]
+    return float(SPACING * sum(np.isfinite(distance).sum() for distance in apart) / 2)
+
+
+def _row(
+    sample: Sample, shared: float, index: PlaceIndex[Key], known: dict[Key, Sample]
+) -> dict[str, object]:
+    """Look a submap up in all but those of its own stretch."""
+    building, stretch, _ = sample.key
+    start = time.process_time()
+    found = index.query(sample.shape, FIRST, lambda key: key[0] != building or key[1] != stretch)
+    took = time.process_time() - start
+    right = [_is_right(sample, place, known) for place in found]
+    rank = right.index(True) if True in right else None
+    return {
+        "log": sample.log,
+        "shared": shared,
+        "rank": rank,
+        "milliseconds": 1000 * took,
+        "submaps": len(index),
+    }
+
+
+def _is_right(sample: Sample, place: Place[Key], known: dict[Key, Sample]) -> bool:
+    """Tell whether a place is right within 0.5 m at the middle of the submap, and 5°."""
+    there = known[place.key]
+    if place.key[0] != sample.key[0] or not np.isfinite(there.frame[0]):
+        return False
+    true = se2.between(there.frame, sample.frame)
+    apart = se2.transform_points(place.transform, sample.middle) - se2.transform_points(
+        true, sample.middle
+    )
+    return is_right(float(np.hypot(*apart)), float(np.abs(se2.wrap(place.transform[2] - true[2]))))
+
+
+def tell(rows: Sequence[dict[str, object]]) -> str:
+    """Return the table by log, and by the wall in common."""
+    groups: dict[str, list[dict[str, object]]] = defaultdict(list)
+    for row in rows:
+        shared = float(str(row["shared"]))
+        groups[str(row["log"])].append(row)
+        groups[f"{max(g for g in GROUPS if g <= shared):g} m and more in common"].append(row)
+        groups["all"].append(row)
+    head = ["submaps", "to be found", "first", f"first {FIRST}", "in the index", "ms, median"]
+    return format_table(head, [_tell_group(name, groups[name]) for name in sorted(groups)])
+
+
+def _tell_group(name: str, rows: Sequence[dict[str, object]]) -> list[str]:
+    ranks = [row["rank"] for row in rows]
+    share = [sum(r in range(most) for r in ranks) / len(rows) for most in (1, FIRST)]
+    among = max(int(str(row["submaps"])) for row in rows)
+    took = float(np.median([float(str(row["milliseconds"])) for row in rows]))
+    return [name, str(len(rows)), *(f"{s:.1%}" for s in share), str(among), f"{took:.1f}"]

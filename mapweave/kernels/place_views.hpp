@@ -1,0 +1,77 @@
+// What maps say of transforms between them, by few samples and coarse cells: cheap enough for hundreds of
+// candidates. The twin and the words are in matching/place_views.py.
+#pragma once
+#include <cmath>
+#include <vector>
+
+#include "arrays.hpp"
+
+namespace place_views {
+
+class PlaceView {
+ public:
+  // codes (rows, columns): what a cell says. samples (n, 4): x, y, direction in turns, metres of wall.
+  PlaceView(In<uint8_t, 2> codes, In<double, 1> origin, double cell, In<double, 2> samples)
+      : rows_(codes.shape(0)),
+        columns_(codes.shape(1)),
+        codes_(codes.data(), codes.data() + rows_ * columns_),
+        cell_(cell),
+        samples_(samples.data(), samples.data() + samples.shape(0) * samples.shape(1)) {
+    if (origin.shape(0) != 2 || samples.shape(1) != 4 || !(cell > 1e-3))
+      throw std::invalid_argument("origin (2,), samples (n, 4), cell above 0 expected");
+    origin_[0] = origin(0), origin_[1] = origin(1);
+  }
+
+  // What the walls of `other` count in this map, at the pose x, y, theta of it.
+  double worth(const PlaceView& other, double x, double y, double theta, const In<double, 2>& table) const {
+    const double c = std::cos(theta), s = std::sin(theta), turn = theta / 6.283185307179586476925286766559 + 2;
+    const double directions = static_cast<double>(table.shape(1));
+    double sum = 0;
+    for (size_t k = 0; k < other.samples_.size(); k += 4) {
+      const double* p = other.samples_.data() + k;
+      const double row = std::floor((c * p[0] - s * p[1] + x - origin_[0]) / cell_);
+      const double column = std::floor((s * p[0] + c * p[1] + y - origin_[1]) / cell_);
+      if (!(row >= 0 && column >= 0 && row < static_cast<double>(rows_) && column < static_cast<double>(columns_)))
+        continue;
+      const size_t code = codes_[static_cast<size_t>(row) * columns_ + static_cast<size_t>(column)];
+      const size_t facing = static_cast<size_t>((p[2] + turn) * directions) % table.shape(1);
+      if (code < table.shape(0)) sum += p[3] * table(code, facing);
+    }
+    return sum;
+  }
+
+ private:
+  size_t rows_, columns_;
+  std::vector<uint8_t> codes_;
+  double origin_[2], cell_;
+  std::vector<double> samples_;
+};
+
+// (n,) what each of `views` and `other` say of the pose of `other` in it, the mean of both.
+inline Out<double> score_views(const PlaceView& other, const std::vector<const PlaceView*>& views,
+                               In<double, 2> transforms, In<double, 2> table) {
+  if (transforms.shape(0) != views.size() || transforms.shape(1) != 3 || table.shape(1) == 0)
+    throw std::invalid_argument("transforms (n, 3) of n views, table (codes, directions) expected");
+  std::vector<double> scores(views.size());
+  for (size_t k = 0; k < views.size(); ++k) {
+    const double x = transforms(k, 0), y = transforms(k, 1), theta = transforms(k, 2);
+    if (!(std::isfinite(x) && std::isfinite(y) && std::abs(theta) < 7))
+      throw std::invalid_argument("transforms: finite numbers, angles within a turn expected");
+    const double c = std::cos(theta), s = std::sin(theta);
+    const double there = views[k]->worth(other, x, y, theta, table);
+    const double back = other.worth(*views[k], -c * x - s * y, s * x - c * y, -theta, table);
+    scores[k] = (there + back) / 2;
+  }
+  const size_t n = scores.size();
+  return give(std::move(scores), {n});
+}
+
+}  // namespace place_views
+
+inline void bind_place_views(nb::module_& m) {
+  using namespace place_views;
+  nb::class_<PlaceView>(m, "PlaceView")
+      .def(nb::init<In<uint8_t, 2>, In<double, 1>, double, In<double, 2>>(), nb::arg("codes"), nb::arg("origin"),
+           nb::arg("cell"), nb::arg("samples"));
+  m.def("score_views", &score_views, nb::arg("other"), nb::arg("views"), nb::arg("transforms"), nb::arg("table"));
+}

@@ -1,0 +1,135 @@
+"""Places by shape: the compiled index and views give what their NumPy twins do."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapweave.kernels.arrays import FloatArray, IntArray
+from mapweave.kernels.loading import COMPILED
+from mapweave.kernels.matching.place_views import PlaceViewNumpy, score_views_numpy
+from mapweave.kernels.matching.shape_index import Found, IndexSettings, ShapeIndexNumpy
+
+seeds = st.integers(0, 2**32 - 1)
+SETTINGS = IndexSettings(6.0, 0.15, 36, 0.3, 0.1, 0.09, 0.25, 90)
+compiled = pytest.mark.skipif(COMPILED is None, reason="no compiled kernels here")
+
+
+def some_words(rng: np.random.Generator, count: int) -> tuple[FloatArray, IntArray]:
+    words = np.column_stack(
+        [
+            rng.uniform(-20, 20, (count, 2)),
+            rng.uniform(-np.pi, np.pi, (count, 1)) + np.zeros((1, 3)),
+            rng.choice([1.0, 2.5, 4.0], count),
+        ]
+    )
+    words[:, 3:5] += np.pi / 2 * rng.integers(0, 4, (count, 2)) + rng.normal(0, 0.03, (count, 2))
+    return words, rng.integers(0, 4, count)
+
+
+def moved(words: FloatArray, x: float, y: float, theta: float) -> FloatArray:
+    """Return `words` of the same map in another frame."""
+    c, s = np.cos(theta), np.sin(theta)
+    place = words[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
+    return np.column_stack([place, words[:, 2:5] + theta, words[:, 5]])
+
+
+def in_order(found: Found) -> Found:
+    """Return what was found, of equals that with the lesser slot and place first."""
+    slots, transforms, votes = found
+    ranked = np.lexsort((*transforms.round(3).T, slots, -votes.round(3)))
+    return slots[ranked], transforms[ranked], votes[ranked]
+
+
+@compiled
+@settings(max_examples=30, deadline=None)
+@given(seeds, st.sampled_from([0, 1, 40]), st.sampled_from([200, 100_000]))
+def test_the_index_finds_what_its_twin_does(seed: int, count: int, budget: int) -> None:
+    assert COMPILED is not None
+    rng = np.random.default_rng(seed)
+    ours, theirs = COMPILED.ShapeIndex(*SETTINGS), ShapeIndexNumpy(*SETTINGS)
+    known = [some_words(rng, 40) for _ in range(6)]
+    for words, kind in known:
+        assert ours.add(words, kind) == theirs.add(words, kind)
+    ours.remove(2)
+    theirs.remove(2)
+    words, kind = known[4][0][:count], known[4][1][:count]
+    words = moved(words, 3.0, -2.0, 1.0)
+    allowed = np.array([1, 0, 1, 1, 1, 1], dtype=np.uint8)
+    asked = (words, kind, np.array([1.0, 2.0]), allowed, budget, 500, 0.35, 0.1)
+    for a, b in zip(in_order(ours.places(*asked)), in_order(theirs.places(*asked)), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-3)
+
+
+@compiled
+@settings(max_examples=30, deadline=None)
+@given(seeds)
+def test_views_score_as_their_twins_do(seed: int) -> None:
+    assert COMPILED is not None
+    rng = np.random.default_rng(seed)
+    table = rng.normal(size=(5, 8))
+    parts = [
+        (
+            rng.integers(0, 5, (12, 9)).astype(np.uint8),
+            rng.uniform(-2, 0, 2),
+            0.2,
+            np.column_stack([rng.uniform(-1, 1, (30, 2)), rng.uniform(0, 1, (30, 2))]),
+        )
+        for _ in range(4)
+    ]
+    motions = np.column_stack([rng.normal(size=(3, 2)), rng.uniform(-np.pi, np.pi, 3)])
+    ours, twins = [COMPILED.PlaceView(*p) for p in parts], [PlaceViewNumpy(*p) for p in parts]
+    np.testing.assert_allclose(
+        COMPILED.score_views(ours[0], ours[1:], motions, table),
+        score_views_numpy(twins[0], twins[1:], motions, table),
+        atol=1e-9,
+    )
+
+
+def makes() -> list[type]:
+    return [ShapeIndexNumpy, *([] if COMPILED is None else [COMPILED.ShapeIndex])]
+
+
+@pytest.mark.parametrize("make", makes())
+def test_words_in_another_frame_vote_for_the_motion_between(make: type) -> None:
+    rng = np.random.default_rng(3)
+    words, kind = some_words(rng, 40)
+    index = make(*SETTINGS)
+    for _ in range(3):
+        index.add(*some_words(rng, 40))
+    right = index.add(words, kind)
+    seen = moved(words, 3.0, -2.0, 1.0)
+    slots, transforms, _ = index.places(
+        seen, kind, np.zeros(2), np.ones(4, dtype=np.uint8), 100_000, 5, 0.35, 0.1
+    )
+    assert slots[0] == right
+    back = moved(seen, *transforms[0].tolist())
+    np.testing.assert_allclose(back[:, :2], words[:, :2], atol=0.3)
+
+
+@pytest.mark.parametrize("make", makes())
+def test_a_map_that_was_removed_is_found_no_more(make: type) -> None:
+    words, kind = some_words(np.random.default_rng(3), 40)
+    index = make(*SETTINGS)
+    index.add(words, kind)
+    index.remove(0)
+    found = index.places(
+        words, kind, np.zeros(2), np.ones(1, dtype=np.uint8), 100_000, 5, 0.35, 0.1
+    )
+    assert len(found[0]) == 0
+    with pytest.raises(ValueError, match="slot"):
+        index.remove(0)
+
+
+@pytest.mark.parametrize("make", makes())
+def test_where_words_are_many_the_rarest_are_looked_at(make: type) -> None:
+    rng = np.random.default_rng(3)
+    common = some_words(rng, 1)
+    rare = some_words(rng, 1)
+    index = make(*SETTINGS)
+    for _ in range(20):
+        index.add(*common)
+    index.add(*rare)
+    words, kind = (np.concatenate(parts) for parts in zip(common, rare, strict=True))
+    found = index.places(words, kind, np.zeros(2), np.ones(21, dtype=np.uint8), 10, 5, 0.35, 0.1)
+    assert found[0].tolist() == [20]
