@@ -20,6 +20,7 @@ from benchmarks import (
     reference,
     same_results,
     team,
+    usual_counts,
     wire,
 )
 from benchmarks.speed import command as speed
@@ -51,6 +52,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,
+    "usual-counts": usual_counts,
     "page": page,
     "mutations": mutations,
 }

@@ -103,7 +103,7 @@ class AgentRun:
         self._reception = Dispatcher(
             mapper.robot, mapper.boot, self._comparisons, self._needs, self._whereabouts
         )
-        self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
+        self._outbox = Outbox(session, team, mapper.robot, mapper.boot, state.sender)
         self._inbox = Inbox()
         self._mapping = threading.Lock()
         self._live: LiveScans | None = None

@@ -35,14 +35,18 @@ class Outbox:
     ----------
     session
         Stays the caller's.
+    sender
+        Codes the maps.
     """
 
-    def __init__(self, session: zenoh.Session, team: str, robot: str, boot: str) -> None:
+    def __init__(
+        self, session: zenoh.Session, team: str, robot: str, boot: str, sender: MapSender
+    ) -> None:
         self._session = session
         self._team = team
         self._robot = robot
         self._boot = boot
-        self._sender = MapSender()
+        self._sender = sender
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[tuple[str, str], AlignmentMessage] = {}
         self._messages = Counter(dict.fromkeys(KINDS, 0))
@@ -126,7 +130,7 @@ class Outbox:
     def _answer(self, query: zenoh.Query, robot_map: RobotMap) -> None:
         try:
             map_key = MAP.build(team=self._team, robot=self._robot)
-            query.reply(map_key, self._sender.payload(robot_map, complete=True))
+            query.reply(map_key, self._sender.whole(robot_map))
             for message in self._found.values():
                 query.reply(self._key_of(message), encode(message))
         except zenoh.ZError as error:

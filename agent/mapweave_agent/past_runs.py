@@ -49,6 +49,11 @@ class PastRun:
 class StateFolder:
     """The folder of a robot's runs; made where it is missing.
 
+    Attributes
+    ----------
+    sender
+        Codes the maps of the run that is kept: the same for the wire, so that it is done once.
+
     Raises
     ------
     FileError
@@ -57,7 +62,7 @@ class StateFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._sender = MapSender()
+        self.sender = MapSender()
         try:
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -71,7 +76,7 @@ class StateFolder:
         FileError
             If it cannot be written.
         """
-        payload = self._sender.payload(robot_map, complete=True)
+        payload = self.sender.whole(robot_map)
         with replace_file(self.path / f"{robot_map.boot}{SUFFIX}") as new:
             new.write_bytes(payload)
 
