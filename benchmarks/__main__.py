@@ -13,6 +13,7 @@ from benchmarks import (
     fusion,
     kidnap,
     live,
+    localize,
     mapping,
     mutations,
     page,
@@ -42,6 +43,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "figure2": figure2,
     "map": mapping,
     "kidnap": kidnap,
+    "localize": localize,
     "live": live,
     "endurance": endurance,
     "fusion": fusion,
@@ -56,7 +58,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "page": page,
     "mutations": mutations,
 }
-USUAL = ("figure2", "map", "kidnap", "fusion")
+USUAL = ("figure2", "map", "kidnap", "localize", "fusion")
 
 
 def main() -> None:

@@ -78,6 +78,13 @@ def not_negative(text: str) -> float:
     return value
 
 
+def whole(text: str) -> int:
+    """Return the whole number that `text` says, 1 or more; ValueError otherwise."""
+    if not text.isascii() or not text.isdigit() or not 0 < int(text[:18]) == int(text):
+        raise ValueError(f"{text}: expected a whole number, 1 or more")
+    return int(text)
+
+
 def add_config_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--config``; read it with `config_of`."""
     parser.add_argument(

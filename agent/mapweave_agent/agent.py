@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import zenoh
 
-from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import Alignment, RobotMap
 from mapweave.scan.scan import Scan
 from mapweave.team.hysteresis import keep_joined
@@ -56,7 +56,7 @@ class AgentRun:
     team
         The team's id.
     mapper
-        Maps the scans of this run.
+        Maps the scans of this run, or follows them in a known map.
     comparer
         Compares maps; it stays the caller's.
     total
@@ -75,7 +75,7 @@ class AgentRun:
         self,
         session: zenoh.Session,
         team: str,
-        mapper: Mapper,
+        mapper: ScanMapper,
         comparer: ComparisonWorker,
         total: int | None,
         parameters: AgentParameters,

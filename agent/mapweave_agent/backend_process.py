@@ -5,9 +5,11 @@ is that of `mapweave map`, whatever the processors were busy with.
 """
 
 import logging
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
 
 from mapweave.mapping.backend import Backend, BackendParameters, BackendResult, FinishedSubmap
+from mapweave.maps import Submap
 from mapweave_agent.worker import Worker, answer
 
 NICENESS = 5  # tracking comes first where processors are few
@@ -21,8 +23,8 @@ class BackendProcess(Worker):
     If the process is gone, it is said once, and submaps stay as they were tracked.
     """
 
-    def __init__(self, parameters: BackendParameters) -> None:
-        super().__init__(_serve, parameters)
+    def __init__(self, parameters: BackendParameters, known: Sequence[Submap] = ()) -> None:
+        super().__init__(_serve, (parameters, tuple(known)))
         self._ended = False
 
     def begin(self, finished: FinishedSubmap) -> None:
@@ -59,6 +61,6 @@ class BackendProcess(Worker):
         )
 
 
-def _serve(pipe: Connection, parameters: BackendParameters) -> None:
+def _serve(pipe: Connection, known: tuple[BackendParameters, tuple[Submap, ...]]) -> None:
     """Settle what comes through `pipe` until its other end is closed."""
-    answer(pipe, NICENESS, Backend(parameters).settle)
+    answer(pipe, NICENESS, Backend(*known).settle)

@@ -15,19 +15,19 @@ from mapweave.cli import (
     config_of,
     positive,
 )
+from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import ScanSource, open_source
-from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave_agent.agent import AgentRun
-from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.live.ros2_output import output_of
 from mapweave_agent.live.scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.source import ReplayClock, count_selected, parse_rate, told_once
+from mapweave_agent.stored.mappers import mapper_of
 from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.session import open_session
@@ -65,6 +65,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         metavar="A:B",
         help="which scans, counted from 0, B not included",
     )
+    add_start_arguments(parser)
     parser.add_argument(
         "--map-interval",
         type=argument(positive),
@@ -105,6 +106,7 @@ def _run(options: argparse.Namespace) -> int:
     # Everything that can be wrong with the input is found before anybody hears of the robot.
     step, warn = config.sensor.angular_step, told_once(_log.warning)
     source = open_source(options.source, ReadOptions(False, step, options.topic, warn, endpoints))
+    start = Start.of(options)
     total = count_selected(options.source, source, options.scans)
     output = output_of(options.publish, robot, endpoints, source)
     earlier = EarlierRuns.of(team, robot, options.state)
@@ -112,18 +114,14 @@ def _run(options: argparse.Namespace) -> int:
     def tell_waiting() -> None:
         _log.info("waiting for a router at %s", ", ".join(endpoints))
 
-    mapping = MapperParameters.of(config)
     compare = partial(align, parameters=FusionParameters.of(config))
+    live = source.live and not math.isinf(options.rate)
     with (
         output as tell,
         ComparisonWorker(compare) as comparer,
-        BackendProcess(mapping.backend) as backend,
+        mapper_of(start, robot, new_boot(), config, live=live) as mapper,
         open_session(endpoints, on_wait=tell_waiting) as session,
     ):
-        live = source.live and not math.isinf(options.rate)
-        mapper = Mapper(
-            robot, new_boot(), mapping, backend, config, live=live, on_warning=_log.warning
-        )
         parameters = AgentParameters(map_interval=options.map_interval)
         past = earlier.young(options.resume_within)
         first = earlier.first_component(session, team, robot)

@@ -11,17 +11,19 @@ from typing import Self, TypeVar
 
 from numpy.typing import ArrayLike
 
+from mapweave.commands.starting import Start
 from mapweave.config import Config
+from mapweave.errors import ArgumentError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
-from mapweave.mapping.mapper import Mapper, MapperParameters
-from mapweave.maps import JointMap
+from mapweave.mapping.localization.known_map import KnownMap
+from mapweave.maps import JointMap, RobotMap
 from mapweave.scan.scan import Scan
 from mapweave_agent.agent import AgentRun
-from mapweave_agent.backend_process import BackendProcess
 from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.publication_schedule import AgentParameters
+from mapweave_agent.stored.mappers import mapper_of
 from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
 from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import open_session
@@ -56,11 +58,18 @@ class Agent:
         How long the router is tried [s]; None for as long as it takes.
     state
         The folder in which the robot's runs are kept; by default that of its team and name.
+    continued
+        A stored map that the run goes on from, as with ``--continue``.
+    localize_in
+        A stored map in which the robot finds itself, and that stays as it is, as with
+        ``--localize``.
 
     Raises
     ------
     InvalidIdError
         If `robot` or `team` is no id.
+    ArgumentError
+        If a map is given both to go on from and to be found in.
 
     Examples
     --------
@@ -82,7 +91,11 @@ class Agent:
         on_pose: Callable[[PoseMessage], None] | None = None,
         patience: float | None = None,
         state: str | Path | None = None,
+        continued: RobotMap | None = None,
+        localize_in: RobotMap | JointMap | None = None,
     ) -> None:
+        if continued is not None and localize_in is not None:
+            raise ArgumentError("localize_in", "expected none beside continued, got both")
         self._robot = check_id("robot", robot)
         self._team = check_id("team", team)
         self._endpoints = (connect,) if isinstance(connect, str) else connect
@@ -91,6 +104,8 @@ class Agent:
         self._on_pose = on_pose
         self._patience = patience
         self._state = None if state is None else Path(state)
+        place = None if localize_in is None else KnownMap.of(localize_in)
+        self._start = Start(continued, place)
         self._scans = LiveScans()
         self._leaving = threading.Event()
         self._failure: BaseException | None = None
@@ -175,12 +190,12 @@ class Agent:
 
     def _open(self, stack: ExitStack) -> AgentRun:
         earlier = EarlierRuns.of(self._team, self._robot, self._state)
-        mapping = MapperParameters.of(self._config)
         compare = partial(align, parameters=FusionParameters.of(self._config))
         session = stack.enter_context(open_session(self._endpoints, patience=self._patience))
         comparer = stack.enter_context(ComparisonWorker(compare))
-        backend = stack.enter_context(BackendProcess(mapping.backend))
-        mapper = Mapper(self._robot, new_boot(), mapping, backend, self._config, live=True)
+        mapper = stack.enter_context(
+            mapper_of(self._start, self._robot, new_boot(), self._config, live=True)
+        )
         return AgentRun(
             session,
             self._team,

@@ -48,10 +48,15 @@ class VersionBuilder:
         Names the numbering, for the message.
     config
         The effective configuration.
+
+    Attributes
+    ----------
+    series
+        May be set while nothing is being built.
     """
 
     def __init__(self, series: str, config: Config) -> None:
-        self._series = series
+        self.series = series
         # The worker's alone.
         self._builder = JointMapBuilder(
             JointParameters.of(config), JointOptimizationParameters.of(config)
@@ -99,6 +104,10 @@ class VersionBuilder:
             return None
         return future.result()
 
+    def packed(self, joint: JointMap) -> bytes:
+        """Return the message of `joint`."""
+        return encode(JointMapMessage.pack(joint, self.series))
+
     def _build(self, draft: Draft, begun: float) -> Built:
         joint = draft.build(self._builder)
-        return Built(draft, begun, joint, encode(JointMapMessage.pack(joint, self._series)))
+        return Built(draft, begun, joint, self.packed(joint))

@@ -2,16 +2,27 @@
 
 import argparse
 import logging
+import math
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
-from mapweave.cli import Command, add_config_argument, argument, config_of, not_negative
+from mapweave.cli import (
+    Command,
+    add_config_argument,
+    argument,
+    config_of,
+    not_negative,
+    positive,
+    whole,
+)
 from mapweave.config import Config
 from mapweave_fusion_server.coordinator import CoordinatorParameters
+from mapweave_fusion_server.past.arguments import default_store
 from mapweave_fusion_server.service import Service
+from mapweave_fusion_server.storage.retention import DAY, DEFAULT_VERSIONS, Retention
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import (
     TOKEN_VARIABLE,
@@ -53,6 +64,24 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="least time between two versions [s] unless maps are joined or parted"
         f" (default {DEFAULT_INTERVAL:g})",
     )
+    _add_retention_arguments(parser)
+
+
+def _add_retention_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--keep-versions",
+        type=argument(whole),
+        default=DEFAULT_VERSIONS,
+        metavar="N",
+        help=f"how many versions the store keeps (default {DEFAULT_VERSIONS})",
+    )
+    parser.add_argument(
+        "--keep-days",
+        type=argument(positive),
+        default=math.inf,
+        metavar="D",
+        help="how long it keeps them [days] (default: for good); the latest stays",
+    )
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -62,15 +91,17 @@ def _run(options: argparse.Namespace) -> int:
     team, endpoints = connection_of(options)
     config = config_of(options)
     parameters = CoordinatorParameters(min_interval=options.min_interval)
-    path = options.store or Path(f"mapweave-{team}.sqlite")
+    path = options.store or default_store(team)
+    retention = Retention(options.keep_versions, options.keep_days * DAY)
 
     def tell_waiting() -> None:
         _log.info("waiting for a router at %s", ", ".join(endpoints))
 
     with (
-        Store(path, team) as store,
+        Store(path, team, retention) as store,
         _page(options.http, team, store, config) as feed,
         open_session(endpoints, on_wait=tell_waiting) as session,
+        nullcontext() if feed is None else feed.positions.heard_on(session, team),
     ):
         Service(session, team, store, parameters, config, feed).run(stop_on_signal())
     return 0

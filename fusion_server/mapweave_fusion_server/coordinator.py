@@ -86,13 +86,22 @@ class Coordinator:
     parameters
         See there.
     last
-        The last version, from which numbering and judging go on; None before the first one.
+        The last version, from which judging goes on; None before the first one, or where it is
+        lost.
+    number
+        Of the last version, from which numbering goes on; that of `last` unless told.
     """
 
-    def __init__(self, parameters: CoordinatorParameters, last: JointMap | None = None) -> None:
+    def __init__(
+        self,
+        parameters: CoordinatorParameters,
+        last: JointMap | None = None,
+        number: int | None = None,
+    ) -> None:
         self._parameters = parameters
-        self._version = last.version if last else 0
+        self._version = number if number is not None else last.version if last else 0
         self._judged = last.alignments if last else ()
+        self._is_last_known = last is not None
         self._names: set[str] = set()
         self._maps: dict[Run, RobotMap] = {}
         self._states: dict[Run, dict[int, dict[int, SubmapPlace]]] = {}
@@ -106,6 +115,11 @@ class Coordinator:
     def has_news(self) -> bool:
         """Whether something that matters is in no draft yet."""
         return self._urgency > Urgency.NONE
+
+    @property
+    def has_version(self) -> bool:
+        """Whether the last version is known, if there was one."""
+        return self._version == 0 or self._is_last_known
 
     @property
     def is_pending(self) -> bool:
@@ -210,6 +224,7 @@ class Coordinator:
         """End the draft that became `joint`; None, when it could not be built, keeps its number."""
         if joint is not None:
             self._version, self._judged = joint.version, joint.alignments
+            self._is_last_known = True
         self._draft = None
 
     def _alignments_in_force(self) -> Iterator[Alignment]:

@@ -6,8 +6,9 @@ and dropped. Knows no clock.
 
 import logging
 from collections.abc import Set
+from typing import TypeVar
 
-from mapweave.errors import FileError, InvalidIdError
+from mapweave.errors import InvalidIdError
 from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator, pair_of
 from mapweave_fusion_server.journal import record
@@ -32,24 +33,27 @@ from mapweave_protocol.wire.messages import (
     MapMessage,
     StatusMessage,
 )
+from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.pairs import Run
 
+M = TypeVar("M", bound=Message)
 _log = logging.getLogger(__name__)
 
 
 def last_version(store: Store) -> JointMap | None:
-    """Return the last version that `store` remembers, None when there is none.
-
-    Raises
-    ------
-    FileError
-        If it is unreadable.
-    """
+    """Return the last version that `store` remembers, None when there is none to be read."""
     payload = store.version(store.latest_version)
+    message = None if payload is None else _remembered(JointMapMessage, payload)
+    return None if message is None else message.unpack()
+
+
+def _remembered(kind: type[M], payload: bytes) -> M | None:
+    """Return a message of the store; what is not valid costs itself, not the store."""
     try:
-        return decode(JointMapMessage, payload).unpack() if payload is not None else None
+        return decode(kind, payload)
     except MessageError as error:
-        raise FileError(store.path, f"the store is damaged: {error}") from error
+        _log.warning("the store: %s; left out", error)
+        return None
 
 
 class Intake:
@@ -98,23 +102,17 @@ class Intake:
         )
 
     def restore(self) -> None:
-        """Take up what the store remembers; what the last version was made of is no news.
-
-        Raises
-        ------
-        FileError
-            If the store holds something unreadable.
-        """
-        try:
-            for payload in self._store.last_maps():
-                robot_map = self._assembler.update(decode(MapMessage, payload))
-                if robot_map is not None:
-                    self._coordinator.receive_map(robot_map)
-            for payload in self._store.last_alignments():
-                self._coordinator.receive_alignments(decode(AlignmentMessage, payload))
-        except MessageError as error:
-            raise FileError(self._store.path, f"the store is damaged: {error}") from error
-        if not self._store.holds_news:
+        """Take up what the store remembers; what the last version was made of is no news."""
+        for payload in self._store.last_maps():
+            message = _remembered(MapMessage, payload)
+            robot_map = None if message is None else self._assembler.update(message)
+            if robot_map is not None:
+                self._coordinator.receive_map(robot_map)
+        for payload in self._store.last_alignments():
+            found = _remembered(AlignmentMessage, payload)
+            if found is not None:
+                self._coordinator.receive_alignments(found)
+        if self._coordinator.has_version and not self._store.holds_news:
             self._coordinator.forget_news()
 
     def take(self, arrival: Arrival, received: float) -> None:

@@ -11,10 +11,11 @@ import zenoh
 from mapweave.config import Config
 from mapweave.errors import MapweaveError
 from mapweave_fusion_server.answers import answer
-from mapweave_fusion_server.builder import VersionBuilder
+from mapweave_fusion_server.builder import Built, VersionBuilder
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
+from mapweave_fusion_server.storage.database import UnwritableError
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_protocol.link import session
@@ -74,13 +75,14 @@ class Service:
         self._story = Story()
         latest = last_version(store)
         self._frames = frames_of(latest)
-        self._coordinator = Coordinator(parameters, latest)
+        self._coordinator = Coordinator(parameters, latest, store.latest_version)
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
         self._boot = keys.new_boot()
         self._status_due = 0.0
         self._builder = VersionBuilder(store.series, config or Config())
+        self._covers = 0
         self._started = time.time()
         self._feed = feed or Feed()
         self._feed.show_version(store.latest_version, self._coordinator.maps)
@@ -116,6 +118,7 @@ class Service:
         for robot in self._intake.robots_to_ask(now):
             request_all_of(self._session, self._team, robot, self._inbox.put)
         if now >= self._status_due:
+            self._resume_storing()
             self._publish_status()
             self._status_due = now + STATUS_INTERVAL
 
@@ -132,19 +135,36 @@ class Service:
             _log.warning("%d messages were not valid and dropped", self._intake.refused)
 
     def _begin(self) -> None:
+        self._covers = self._store.news
         self._builder.start(self._coordinator.begin(time.monotonic()), time.time())
 
     def _conclude(self) -> None:
         built = self._builder.take()
         if built is not None:
             # Stored first: what was published once must be there after a crash.
-            self._store.add_version(built.draft.version, built.begun, built.payload)
-            self._publisher.put(built.payload)
+            self._publisher.put(self._keep(built))
             self._frames = frames_of(built.joint)
             self._status_due = 0.0  # robots wait for their new frames
             self._feed.show_version(built.draft.version, built.draft.maps)
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
+
+    def _keep(self, built: Built) -> bytes:
+        """Store a version; return its message, of another series where there is no room."""
+        number, payload = built.draft.version, built.payload
+        try:
+            self._store.add_version(number, built.begun, payload, self._covers)
+        except UnwritableError as error:
+            self._store.hold()
+            self._builder.series = self._store.series
+            payload = self._builder.packed(built.joint)
+            self._store.add_version(number, built.begun, payload, self._covers)
+            _log.error("%s; going on without it until there is room", error)
+        return payload
+
+    def _resume_storing(self) -> None:
+        if not self._store.is_storing and self._store.resume():
+            _log.info("the store can be written again: all that waited is in it")
 
     def _publish_again(self) -> None:
         """Publish the latest version of the store: the cache died with the last publisher."""

@@ -4,50 +4,30 @@ Messages are kept as the bytes that travelled; nothing here can read them, and n
 a clock: times are passed in.
 """
 
-import secrets
-import sqlite3
-import threading
+import fcntl
+import logging
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from mapweave.errors import FileError
+from mapweave_fusion_server.storage.database import DamagedError, Database, UnwritableError
+from mapweave_fusion_server.storage.held import Held
+from mapweave_fusion_server.storage.retention import Retention
+from mapweave_fusion_server.storage.rows import Row, VersionRow, drop_versions
+from mapweave_fusion_server.storage.salvage import is_sound, salvage
+from mapweave_fusion_server.storage.schema import checksum, create, is_missing, migrate, new_series
 
-APPLICATION_ID = 0x4D505756  # "MPWV", in the file's header (SQLite file format, 1.3.17)
-SCHEMA_VERSION = 3  # rises with the wire's: messages are kept as they travelled
-_HEADER_LENGTH = 100
-_MAGIC = b"SQLite format 3\0"
-
-_SCHEMA = f"""
-BEGIN EXCLUSIVE;
-PRAGMA application_id = {APPLICATION_ID};
-PRAGMA user_version = {SCHEMA_VERSION};
-CREATE TABLE owner (team TEXT NOT NULL, series TEXT NOT NULL);
-CREATE TABLE version (
-    number INTEGER PRIMARY KEY,
-    created REAL NOT NULL,           -- seconds since 1970
-    message BLOB NOT NULL);
-CREATE TABLE alignment (
-    id INTEGER PRIMARY KEY,
-    received REAL NOT NULL,
-    first TEXT NOT NULL,             -- runs of the pair, in ascending order
-    second TEXT NOT NULL,
-    message BLOB NOT NULL);
-CREATE INDEX alignment_pair ON alignment (first, second);
-CREATE TABLE robot_map (
-    robot TEXT NOT NULL,
-    boot TEXT NOT NULL,              -- of the run
-    last_component INTEGER NOT NULL, -- higher for a later run
-    received REAL NOT NULL,
-    message BLOB NOT NULL,
-    PRIMARY KEY (robot, boot));
-"""
+_log = logging.getLogger(__name__)
 
 
 class Store:
     """The store of one team; a context manager, usable from several threads.
+
+    A version is on the disk when `add_version` returns, whatever becomes of the machine. Where the
+    disk is full, what comes is held, and written when there is room again (`resume`).
 
     Parameters
     ----------
@@ -55,32 +35,28 @@ class Store:
         The file; made when it is missing or empty.
     team
         Whose store it is; a file belongs to one team for good.
-
-    Attributes
-    ----------
-    series
-        Names this store and its numbering: another store counts from 1 again.
+    retention
+        How much of the past is kept.
 
     Raises
     ------
     FileError
-        If the file is not a store, is damaged, is of another team or schema, or is in use. It is
-        left as it was.
+        If the file is not a store, cannot be read at all, is of another team or schema, or is in
+        use. It is left as it was.
     """
 
-    def __init__(self, path: Path, team: str) -> None:
+    def __init__(self, path: Path, team: str, retention: Retention | None = None) -> None:
         self.path = path
-        self.series: str
-        self._lock = threading.Lock()
-        fresh = _check_header(path)
-        with self._errors_reported():
-            self._connection = sqlite3.connect(
-                path, timeout=0.0, isolation_level=None, check_same_thread=False
-            )
+        self._retention = retention or Retention()
+        self._held = Held()
+        self._damage: set[str] = set()
+        if is_missing(path):
+            create(path, team)
+        self._owned = _own(path)
         try:
-            self._prepare(team, fresh)
+            self._database = self._open(team)
         except FileError:
-            self._connection.close()
+            os.close(self._owned)
             raise
 
     def __enter__(self) -> "Store":
@@ -92,139 +68,262 @@ class Store:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        with self._lock, self._errors_reported():
-            self._connection.close()
+        self.resume()
+        try:
+            self._database.close()
+        finally:
+            os.close(self._owned)
+
+    @property
+    def series(self) -> str:
+        """Names this store and its numbering: another store counts from 1 again."""
+        return self._held.series or self._series
+
+    @property
+    def is_storing(self) -> bool:
+        """Whether what comes is written, and does not wait for room."""
+        return not self._held
+
+    @property
+    def damaged(self) -> int:
+        """How many rows could not be read; each was logged."""
+        return len(self._damage)
+
+    @property
+    def news(self) -> int:
+        """The number of the last alignment or map that was kept."""
+        return self._news
+
+    @property
+    def oldest_version(self) -> int:
+        """The number of the first version that is still kept, 0 when there is none."""
+        [(number,)] = self._database.rows("SELECT coalesce(min(number), 0) FROM version")
+        return int(number) or min(self._held.versions, default=0)
 
     @property
     def latest_version(self) -> int:
         """The number of the last version, 0 when there is none."""
-        [(number,)] = self._rows("SELECT coalesce(max(number), 0) FROM version")
-        return int(number)
+        [(number,)] = self._database.rows("SELECT coalesce(max(number), 0) FROM version")
+        return max(int(number), *self._held.versions, 0)
 
-    def add_version(self, number: int, created: float, message: bytes) -> None:
-        """Keep version `number`, the next one: what was known at `created` [s since 1970]."""
+    def add_version(
+        self, number: int, created: float, message: bytes, covers: int | None = None
+    ) -> None:
+        """Keep version `number`, the next one: what was known at `created` [s since 1970].
+
+        Parameters
+        ----------
+        covers
+            `news` as it was then; as it is now unless told.
+
+        Raises
+        ------
+        UnwritableError
+            If it cannot be written now, and `hold` was not called.
+        """
         if number != self.latest_version + 1:
             raise ValueError(f"version {number} does not follow {self.latest_version}")
-        self._rows("INSERT INTO version VALUES (?, ?, ?)", number, created, message)
+        version = VersionRow(number, created, message, self._news if covers is None else covers)
+        if not self.resume() and self._held.series is not None:
+            self._held.add_version(version)
+            return
+        if self._held:
+            raise UnwritableError(self.path, "the store cannot be written")
+        with self._database.transaction(durable=True):
+            version.insert(self._database)
+            drop_versions(self._database, self._retention, number, created)
+
+    def hold(self) -> None:
+        """Let versions wait in memory where they cannot be written, in a series of their own.
+
+        If the process ends before there is room, they are lost, and the store goes on with the
+        numbers that they had: by the series, others can tell them apart.
+        """
+        self._held.series = new_series()
+
+    def resume(self) -> bool:
+        """Write what waits, if there is room; return whether nothing waits any more."""
+        if not self._held:
+            return True
+        try:
+            with self._database.transaction(durable=True):
+                self._write_held()
+        except UnwritableError:
+            return False
+        self._series, self._held = self.series, Held()
+        return True
 
     def version(self, number: int) -> bytes | None:
-        """Return the message of version `number`, None when there is none."""
-        return self._blob("SELECT message FROM version WHERE number = ?", number)
+        """Return the message of version `number`, None when there is none that can be read."""
+        if number in self._held.versions:
+            return self._held.versions[number].message
+        return self._message("version", number, f"version {number}")
 
     def versions_created(self, since: int, limit: int) -> list[tuple[int, float]]:
         """Return number and time [s since 1970] of at most `limit` versions after `since`."""
         sql = "SELECT number, created FROM version WHERE number > ? ORDER BY number LIMIT ?"
-        return [(int(number), float(t)) for number, t in self._rows(sql, since, limit)]
+        stored = [(int(n), float(t)) for n, t in self._database.rows(sql, since, limit)]
+        held = [(v.number, v.created) for v in self._held.versions.values() if v.number > since]
+        return [*stored, *held][:limit]
 
     def versions_since(self, number: int) -> Iterator[bytes]:
         """Yield the messages of all versions after `number`, oldest first, one at a time."""
-        for wanted in range(max(number, 0) + 1, self.latest_version + 1):
+        for wanted in range(max(number + 1, self.oldest_version, 1), self.latest_version + 1):
             message = self.version(wanted)
             if message is not None:
                 yield message
 
     def add_alignments(self, pair: tuple[str, str], received: float, message: bytes) -> None:
-        """Keep what was found for a pair of runs, beside all that was found before."""
-        self._rows(
-            "INSERT INTO alignment (received, first, second, message) VALUES (?, ?, ?, ?)",
-            received, *sorted(pair), message,
-        )  # fmt: skip
+        """Keep what was found for a pair of runs, beside what was found before."""
+        first, second = sorted(pair)
+        self._keep((first, second), "alignment", (None, received, first, second), message)
 
     def last_alignments(self) -> list[bytes]:
-        """Return the last message of every pair of runs."""
-        return self._blobs(
-            "SELECT message FROM alignment WHERE id IN"
-            " (SELECT max(id) FROM alignment GROUP BY first, second) ORDER BY id"
+        """Return the last message of every pair of runs, as far as it can be read."""
+        numbers = self._database.rows(
+            "SELECT max(id) AS last, first, second FROM alignment GROUP BY first, second"
+            " ORDER BY last"
         )
+        return self._messages("alignment", ((n, f"of {a} and {b}") for n, a, b in numbers))
 
     def keep_map(
         self, run: tuple[str, str], last_component: int, received: float, message: bytes
     ) -> None:
         """Keep the map of a run, a robot and a boot, in place of the last one of that run."""
-        self._rows(
-            "INSERT OR REPLACE INTO robot_map VALUES (?, ?, ?, ?, ?)",
-            *run, last_component, received, message,
-        )  # fmt: skip
+        self._keep(run, "robot_map", (*run, last_component, received), message)
 
     def map_of(self, robot: str) -> bytes | None:
         """Return the map of a robot's last run, None when it was never heard of."""
-        return self._blob(
-            "SELECT message FROM robot_map WHERE robot = ? ORDER BY last_component DESC LIMIT 1",
+        rows = self._database.rows(
+            "SELECT rowid, last_component FROM robot_map WHERE robot = ?"
+            " ORDER BY last_component DESC",
             robot,
         )
+        waiting = [row for row in self._held.of("robot_map") if row.values[0] == robot]
+        held = {int(str(row.values[2])): row.message for row in waiting}
+        last = max(held, default=-1)
+        for number, component in rows:
+            if component <= last:
+                break
+            message = self._message("robot_map", number, f"the map of {robot}")
+            if message is not None:
+                return message
+        return held.get(last)
 
     def last_maps(self) -> list[bytes]:
         """Return the last map of every run of every robot, also of those that are gone."""
-        return self._blobs("SELECT message FROM robot_map ORDER BY robot, last_component")
+        numbers = self._database.rows(
+            "SELECT rowid, robot, boot FROM robot_map ORDER BY robot, last_component"
+        )
+        return self._messages("robot_map", ((n, f"of {r}@{b}") for n, r, b in numbers))
 
     @property
     def holds_news(self) -> bool:
-        """Whether something was received after what the last version was made of."""
-        [(received, created)] = self._rows(
-            "SELECT (SELECT max(received) FROM (SELECT received FROM alignment"
-            " UNION ALL SELECT received FROM robot_map)), (SELECT max(created) FROM version)"
-        )
-        return received is not None and (created is None or received > created)
+        """Whether something was received that is not in the last version."""
+        [(covers,)] = self._database.rows("SELECT coalesce(max(covers), 0) FROM version")
+        return self._news > int(covers)
 
-    def _prepare(self, team: str, fresh: bool) -> None:
-        # One process owns the file: two coordinators would both number the next version.
-        self._rows("PRAGMA locking_mode = EXCLUSIVE")
-        if fresh:
-            self._create(team)
-        elif self._rows("PRAGMA quick_check") != [("ok",)]:
-            raise FileError(self.path, "the store is damaged; move it away to begin a new one")
-        [(owner, self.series)] = self._rows("SELECT team, series FROM owner")
+    def _keep(
+        self, of: tuple[str, str], table: str, values: tuple[object, ...], message: bytes
+    ) -> None:
+        """Write what came, or let it wait for room; of the same thing the last one counts."""
+        self._news += 1
+        row = Row(table, values, message, self._news)
+        if not self._held:
+            try:
+                with self._database.transaction(durable=False):
+                    row.insert(self._database)
+            except UnwritableError as error:
+                _log.warning("%s; what comes waits for room", error)
+            else:
+                return
+        self._held.rows[table, *of] = row
+
+    def _write_held(self) -> None:
+        self._database.rows("UPDATE owner SET series = ?", self.series)
+        for version in self._held.versions.values():
+            version.insert(self._database)
+        for row in self._held.rows.values():
+            row.insert(self._database)
+
+    def _open(self, team: str) -> Database:
+        database = Database(self.path)
+        try:
+            if not is_sound(database):
+                salvage(database, self.path, team)
+                database, damaged = Database(self.path), self._owned
+                self._owned = _own(self.path)
+                os.close(damaged)
+            migrate(database)
+            self._take_over(database, team)
+            database.rows("PRAGMA journal_mode = WAL")  # a crash loses no consistency
+        except FileError:
+            database.close()
+            raise
+        return database
+
+    def _take_over(self, database: Database, team: str) -> None:
+        """Read whose store it is; begin a new series where this is a copy of another file.
+
+        Where a copy is put in the place of a store, versions may have been published that it does
+        not have: their numbers must not be given again.
+        """
+        owners = database.rows("SELECT team, series, inode FROM owner")
+        if not owners:
+            _log.warning("%s: damaged, its owner is not known; a new series begins", self.path)
+        owner, self._series, inode = owners[0] if owners else (team, new_series(), None)
+        self._series = str(self._series)
         if owner != team:
             raise FileError(self.path, f"the store of team {owner!r}, expected team {team!r}")
-        self._rows("PRAGMA journal_mode = WAL")
-        self._rows("PRAGMA synchronous = NORMAL")  # in WAL mode a crash still loses no consistency
+        here = self.path.stat().st_ino
+        if inode not in (None, here):
+            self._series = new_series()
+            _log.warning("%s: a copy; a new series begins", self.path)
+        if inode != here:
+            with database.transaction(durable=True):
+                database.rows("DELETE FROM owner")
+                database.rows("INSERT INTO owner VALUES (?, ?, ?)", team, self._series, here)
+        [(news,)] = database.rows(
+            "SELECT max((SELECT coalesce(max(covers), 0) FROM version),"
+            " (SELECT coalesce(max(news), 0) FROM alignment),"
+            " (SELECT coalesce(max(news), 0) FROM robot_map))"
+        )
+        self._news = int(news)
 
-    def _create(self, team: str) -> None:
-        with self._lock, self._errors_reported():
-            self._connection.executescript(_SCHEMA)
-        self._rows("INSERT INTO owner VALUES (?, ?)", team, secrets.token_hex(6))
-        self._rows("COMMIT")
+    def _messages(self, table: str, rows: Iterator[tuple[int, str]]) -> list[bytes]:
+        found = [self._message(table, number, f"{table} {what}") for number, what in rows]
+        return [message for message in found if message is not None]
 
-    def _rows(self, sql: str, *values: object) -> list[tuple[Any, ...]]:
-        with self._lock, self._errors_reported():
-            return self._connection.execute(sql, values).fetchall()
-
-    def _blobs(self, sql: str, *values: object) -> list[bytes]:
-        return [bytes(row[0]) for row in self._rows(sql, *values)]
-
-    def _blob(self, sql: str, *values: object) -> bytes | None:
-        return next(iter(self._blobs(sql, *values)), None)
-
-    @contextmanager
-    def _errors_reported(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.OperationalError as error:
-            if "locked" in str(error):
-                raise FileError(self.path, "in use by another mapweave server") from error
-            raise FileError(self.path, f"the store cannot be used: {error}") from error
-        except sqlite3.DatabaseError as error:
-            raise FileError(self.path, f"the store is damaged: {error}") from error
+    def _message(self, table: str, number: int, what: str) -> bytes | None:
+        """Return the message of a row, None if there is no such row or it is damaged."""
+        rows = None
+        with suppress(DamagedError):
+            rows = self._database.rows(
+                f"SELECT message, checksum FROM {table} WHERE rowid = ?", number
+            )
+        if rows == []:
+            return None
+        message, expected = rows[0] if rows else (None, None)
+        if isinstance(message, bytes) and checksum(message) == expected:
+            return message
+        if what not in self._damage:
+            self._damage.add(what)
+            _log.warning("%s: damaged: %s is left out", self.path, what)
+        return None
 
 
-def _check_header(path: Path) -> bool:
-    """Return whether a new store is to be made at `path`; read, without SQLite touching it.
+def _own(path: Path) -> int:
+    """Take the file for this process: two coordinators would both number the next version.
 
-    SQLite would create journals beside a foreign database, and roll back its pending ones.
+    Whoever only reads it is not kept out. To be closed after SQLite's own use of the file.
     """
     try:
-        with path.open("rb") as file:
-            header = file.read(_HEADER_LENGTH)
-    except FileNotFoundError:
-        return True
+        file = os.open(path, os.O_RDONLY)
     except OSError as error:
         raise FileError(path, f"the store cannot be read: {error.strerror}") from error
-    if not header:
-        return True
-    if len(header) < _HEADER_LENGTH or not header.startswith(_MAGIC):
-        raise FileError(path, "not a mapweave store: expected an SQLite file")
-    if int.from_bytes(header[68:72], "big") != APPLICATION_ID:
-        raise FileError(path, "not a mapweave store, but another program's SQLite file")
-    if (schema := int.from_bytes(header[60:64], "big")) != SCHEMA_VERSION:
-        raise FileError(path, f"a store of schema {schema}, expected {SCHEMA_VERSION}")
-    return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(file)
+        raise FileError(path, "in use by another mapweave server") from error
+    return file

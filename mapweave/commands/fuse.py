@@ -1,16 +1,17 @@
 """``mapweave fuse``: robots' maps to a joint map."""
 
 import argparse
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
 from mapweave.cli import Command, add_config_argument, config_of
 from mapweave.commands.progress import track
+from mapweave.commands.stored_joint import as_robot_maps, robots_of, with_members
 from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave.fusion.align import FusionParameters, align
-from mapweave.io.map_files import read_map, save
+from mapweave.io.map_files import load, save
 from mapweave.maps import Alignment, JointMap, RobotMap, parse_component
 from mapweave.pictures.picture import check_picture_suffix, plot
 from mapweave.team.joint_map import fuse
@@ -20,7 +21,9 @@ EXIT_NOT_ALL_JOINED = 3
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("first", metavar="MAP.json", type=Path, help="a robot's map")
+    parser.add_argument(
+        "first", metavar="MAP.json", type=Path, help="a robot's map, or a stored joint map"
+    )
     parser.add_argument("others", metavar="MAP.json", type=Path, nargs="+", help="other robots'")
     parser.add_argument("--output", metavar="JOINT.json", type=Path, help="the joint map to write")
     parser.add_argument("--plot", metavar="JOINT.png", type=Path, help="the picture (png, svg)")
@@ -33,34 +36,51 @@ def _run(options: argparse.Namespace) -> int:
         check_picture_suffix(options.plot)
     inputs = [options.first, *options.others]
     check_outputs([options.output, options.plot], inputs)
-    maps = _read_distinct(inputs)
-    joint = fuse(list(maps.values()), _compared(list(maps.values()), config), config)
+    given = _read_distinct(inputs)
+    maps = [m for some in given for m in _as_maps(some)]
+    stored = [some for some in given if isinstance(some, JointMap)]
+    joint = with_members(fuse(maps, _compared(given, config), config), stored)
     if options.output:
         save(joint, options.output)
     if options.plot:
-        plot(joint, options.plot, maps)
+        plot(joint, options.plot, {m.robot: m for m in given if isinstance(m, RobotMap)})
     for line in tell(joint):
         print(line)  # noqa: T201
-    return 0 if _all_robots_joined(joint, len(maps)) else EXIT_NOT_ALL_JOINED
+    robots = set().union(*(_robots(some) for some in given))
+    return 0 if _all_joined(joint, robots) else EXIT_NOT_ALL_JOINED
 
 
-def _read_distinct(paths: list[Path]) -> dict[str, RobotMap]:
-    """Read maps; each is of another robot."""
-    maps: dict[str, RobotMap] = {}
+def _read_distinct(paths: list[Path]) -> list[RobotMap | JointMap]:
+    """Read maps; each is of other robots."""
+    maps: list[RobotMap | JointMap] = []
+    robots: set[str] = set()
     for path in paths:
-        robot_map = read_map(path)
-        if robot_map.robot in maps:
+        some_map = load(path)
+        if twice := sorted(_robots(some_map) & robots):
             raise FileError(
-                path,
-                f"robot {robot_map.robot!r} was given already; expected a map of another robot",
+                path, f"robot {twice[0]!r} was given already; expected a map of another robot"
             )
-        maps[robot_map.robot] = robot_map
+        robots |= _robots(some_map)
+        maps.append(some_map)
     return maps
 
 
-def _compared(maps: list[RobotMap], config: Config) -> list[Alignment]:
-    """Compare all pairs of `maps`."""
-    pairs, parameters = list(combinations(maps, 2)), FusionParameters.of(config)
+def _robots(some_map: RobotMap | JointMap) -> set[str]:
+    return {some_map.robot} if isinstance(some_map, RobotMap) else robots_of(some_map)
+
+
+def _as_maps(some_map: RobotMap | JointMap) -> list[RobotMap]:
+    return [some_map] if isinstance(some_map, RobotMap) else as_robot_maps(some_map)
+
+
+def _compared(given: list[RobotMap | JointMap], config: Config) -> list[Alignment]:
+    """Compare all pairs of what is `given`; what is in one joint map was compared then."""
+    pairs = [
+        pair
+        for one, other in combinations(given, 2)
+        for pair in product(_as_maps(one), _as_maps(other))
+    ]
+    parameters = FusionParameters.of(config)
     return [a for one, other in track(pairs, "comparing") for a in align(one, other, parameters)]
 
 
@@ -84,10 +104,10 @@ def _tell_components(joint: JointMap) -> list[str]:
     ]
 
 
-def _all_robots_joined(joint: JointMap, robots: int) -> bool:
+def _all_joined(joint: JointMap, robots: set[str]) -> bool:
     """Whether one component has a part of every robot."""
     return any(
-        len({parse_component(name)[0] for name in component.robots}) == robots
+        {parse_component(name)[0] for name in component.robots} == robots
         for component in joint.components
     )
 

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
@@ -13,28 +14,37 @@ from mapweave.cli import (
     config_of,
 )
 from mapweave.commands.progress import track
+from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave.ids import check_id
+from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import STANDARD_INPUT, ScanSource, open_source
+from mapweave.mapping.grids.grid_map import map_of_grid
+from mapweave.mapping.localization.localizer import Localizer
 from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import RobotMap
 from mapweave.pictures.picture import check_picture_suffix, plot
+
+ROBOT = "r1"
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "log",
         metavar="LOG",
-        help="CARMEN, TORO or g2o, may be gzipped; a ROS bag, a file or a folder; or - for lines of"
-        " JSON on standard input",
+        help="CARMEN, TORO or g2o, may be gzipped; a ROS bag, a file or a folder; the .yaml of a"
+        " map_server grid; or - for lines of JSON on standard input",
     )
     add_topic_argument(parser)
     parser.add_argument("--output", metavar="MAP.json", type=Path, help="the map file to write")
-    parser.add_argument("--robot", metavar="ID", default="r1", help="the robot's id (%(default)s)")
+    parser.add_argument(
+        "--robot", metavar="ID", help=f"the robot's id ({ROBOT}, or that of the map to continue)"
+    )
     parser.add_argument(
         "--scans",
         metavar="A:B",
@@ -48,6 +58,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="let the log's odometry help; what was seen decides (%(default)s)",
     )
+    add_start_arguments(parser)
     parser.add_argument(
         "--plot", metavar="MAP.png", type=Path, help="the picture to write (png, svg)"
     )
@@ -55,28 +66,62 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    check_id("robot", options.robot)
+    if options.robot is not None:
+        check_id("robot", options.robot)
     config = config_of(options)
     if options.plot:
         check_picture_suffix(options.plot)
     inputs = [] if options.log == STANDARD_INPUT else [Path(options.log)]
-    check_outputs([options.output, options.plot], inputs)
+    stored = [path for path in (options.continued, options.localize) if path is not None]
+    check_outputs([options.output, options.plot], [*inputs, *stored])
+    start = Start.of(options)
+    if is_grid(Path(options.log)):
+        return _run_grid(options, config)
     step, prior = config.sensor.angular_step, options.odometry == "prior"
     source = open_source(options.log, ReadOptions(prior, step, options.topic, _warn))
-    robot_map, taken = _map_all(options, source, config)
+    mapper = _mapper(options.robot, start, config)
+    robot_map, taken = _map_all(options, source, mapper)
+    _check_placed(options, _new(robot_map, start), taken)
+    _write(options, robot_map)
+    print(_summary(_new(robot_map, start), taken))  # noqa: T201
+    return 0
+
+
+def _run_grid(options: argparse.Namespace, config: Config) -> int:
+    """Turn another program's grid into a map."""
+    for given, name in ((options.continued, "--continue"), (options.localize, "--localize")):
+        if given is not None:
+            raise FileError(options.log, f"is a grid; expected a log to take {name} with")
+    robot_map = map_of_grid(read_grid(Path(options.log)), options.robot or ROBOT, config)
+    if not robot_map.submaps:
+        raise FileError(options.log, "no wall of it can be seen from its free cells; expected some")
+    _write(options, robot_map)
+    lines = robot_map.submaps[0].map
+    print(f"{len(lines.polylines)} polylines, {len(lines.segments)} segments")  # noqa: T201
+    return 0
+
+
+def _write(options: argparse.Namespace, robot_map: RobotMap) -> None:
     if options.output:
         save(robot_map, options.output)
     if options.plot:
         plot(robot_map, options.plot)
-    print(_summary(robot_map, taken))  # noqa: T201
-    return 0
+
+
+def _mapper(robot: str | None, start: Start, config: Config) -> ScanMapper:
+    """Return what maps, or localizes, as `start` says."""
+    if start.place is not None:
+        return Localizer(
+            start.place, robot or ROBOT, config=config, on_warning=_warn, on_news=_warn
+        )
+    name = ROBOT if start.known is None else start.known.robot
+    return Mapper(robot or name, config=config, on_warning=_warn, known=start.known)
 
 
 def _map_all(
-    options: argparse.Namespace, source: ScanSource, config: Config
+    options: argparse.Namespace, source: ScanSource, mapper: ScanMapper
 ) -> tuple[RobotMap, int]:
     """Map the chosen scans; return the map and how many scans there were."""
-    mapper = Mapper(options.robot, config=config, on_warning=_warn)
     scans = source.count() if sys.stderr.isatty() else None
     total = None if scans is None else options.scans.count(scans)
     name = Path(options.log).name
@@ -84,14 +129,28 @@ def _map_all(
     for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
         mapper.add(scan)
         taken += 1
-    robot_map = mapper.finish()
-    if not robot_map.submaps:
+    return mapper.finish(), taken
+
+
+def _new(robot_map: RobotMap, start: Start) -> RobotMap:
+    """Return what this run has mapped, or where it was located."""
+    return replace(robot_map, submaps=robot_map.submaps[start.submaps :])
+
+
+def _check_placed(options: argparse.Namespace, new: RobotMap, taken: int) -> None:
+    if new.submaps:
+        return
+    if options.localize is not None:
         raise FileError(
             options.log,
-            f"none of its {taken} chosen scans can be mapped; expected scans whose"
-            " returns are dense enough to show walls, and a range of scans that it has",
+            f"none of its {taken} chosen scans can be found in {options.localize}; expected some"
+            " metres of a drive in a place that it shows",
         )
-    return robot_map, taken
+    raise FileError(
+        options.log,
+        f"none of its {taken} chosen scans can be mapped; expected scans whose"
+        " returns are dense enough to show walls, and a range of scans that it has",
+    )
 
 
 def _warn(message: str) -> None:

@@ -53,7 +53,8 @@ def outside(
 
     Infinite where what most of it is in is no room, but a corridor or a hall, by either map: the
     other may have seen a part of it. Otherwise the less counts, for one of them may have seen more
-    through the door.
+    through the door. A map that knows of no free space as wide as a passage tells of no room: the
+    other one decides, and where neither tells, how far the wall in common spreads.
 
     Parameters
     ----------
@@ -69,7 +70,11 @@ def outside(
         _outside(reference, other, transform, verification, p),
         _outside(other, reference, back, verification, p),
     )
-    return math.inf if math.inf in both else min(both)
+    told = [metres for metres in both if metres is not None]
+    if not told:
+        shared = coinciding(reference, other, transform, verification)
+        return 0.0 if _longer_side(other.oriented.points[shared]) <= p.max_extent else math.inf
+    return math.inf if math.inf in told else min(told)
 
 
 def _outside(
@@ -78,11 +83,11 @@ def _outside(
     transform: FloatArray,
     verification: VerificationParameters,
     p: RoomParameters,
-) -> float:
-    """Count by the rooms of `reference`."""
+) -> float | None:
+    """Count by the rooms of `reference`; None where it tells of none."""
     nearest, extents = _rooms(reference, p)
     if len(extents) == 0:
-        return math.inf
+        return None
     shared = coinciding(reference, other, transform, verification)
     walls = other.oriented.at(shared).moved(transform)
     # A wall is of the room that it faces.
@@ -93,6 +98,16 @@ def _outside(
     inside = np.bincount(nearest[i, j], other.weight[shared], len(extents))
     most = int(np.argmax(inside))
     return float(inside.sum() - inside[most]) if extents[most] <= p.max_extent else math.inf
+
+
+def _longer_side(points: FloatArray) -> float:
+    """Return the longer side [m] of the least rectangle, in steps of 3°, that holds (n, 2)."""
+    if len(points) == 0:
+        return 0.0
+    turn = np.arange(0.0, np.pi / 2, np.radians(3.0))
+    axes = np.stack([np.cos(turn), np.sin(turn), -np.sin(turn), np.cos(turn)])
+    sides = np.ptp(points @ axes.reshape(2, 2, -1).transpose(2, 1, 0), axis=1)
+    return float(sides[np.argmin(sides.prod(axis=1))].max())
 
 
 def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArray]:

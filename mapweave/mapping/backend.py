@@ -114,13 +114,14 @@ class BackendRunner(Protocol):
 
 
 class Backend:
-    """Settles at once, where it is called."""
+    """Settles at once, where it is called; `known` are submaps to go on from, ids from 0."""
 
-    def __init__(self, parameters: BackendParameters) -> None:
+    def __init__(self, parameters: BackendParameters, known: Sequence[Submap] = ()) -> None:
         self._parameters = parameters
-        self._submaps: list[Submap] = []
+        self._submaps = list(known)
         self._component_merger = ComponentMerger(parameters.component_merging)
         self._loops = LoopCloser(parameters.loops)
+        self._loops.graph.take_over(known)
         self._kidnap_detector = KidnapDetector(parameters.kidnapping)
         self._tracked = 0  # how many of the last submaps were tracked from one another
         self._settled: BackendResult | None = None

@@ -16,6 +16,7 @@ from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
+from mapweave.mapping.continuation import first_component, scans_in, to_continue
 from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
 from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
@@ -79,6 +80,10 @@ class Mapper:
         being settled. The map then depends on how fast that is.
     on_warning
         Told in words what is odd about the scans, once: that the robot sees itself.
+    known
+        A map to go on from: its submaps come first, and the run is joined to them by shape, as a
+        robot's own components are. Scans that are counted from 0 again are counted on. A backend
+        that is given must know the same.
     """
 
     def __init__(
@@ -91,17 +96,19 @@ class Mapper:
         *,
         live: bool = False,
         on_warning: Callable[[str], None] | None = None,
+        known: RobotMap | None = None,
     ) -> None:
         self.robot = check_id("robot", robot)
         self.boot = boot
         config = Config() if config is None else config
         check_kind("config", config, Config)
         self.parameters = parameters or MapperParameters.of(config)
-        known = self.parameters == MapperParameters.of(config)
-        self._made_with = MadeWith.of(config) if known else None
+        as_configured = self.parameters == MapperParameters.of(config)
+        self._made_with = MadeWith.of(config) if as_configured else None
         self._version = 0
-        self._finished: list[Submap] = []
-        self._component = self._newest_component = 0
+        self._finished = list(to_continue(known))
+        self._known = len(self._finished)  # submaps, of an earlier run
+        self._component = self._newest_component = first_component(self._finished)
         self._on_warning = on_warning
         self._body = OwnBody(self.parameters.own_body)
         # Raw scans so far, as long as no submap is finished.
@@ -110,13 +117,16 @@ class Mapper:
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
-        self._backend = backend or Backend(self.parameters.backend)
+        self._backend = backend or Backend(self.parameters.backend, self._finished)
         self._live = live
         self._unsettled: Unsettled | None = None  # the last finished submap, while it is settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
         self._held: FloatArray = EXACT  # how surely the last scan is placed, tracker's frame
-        self._next_index = 0  # of scans that have no number, and the least of those that have
+        # Of scans that have no number, and the least of those that have: on from an earlier run.
+        self._next_index = scans_in(self._finished)
+        self._shift: int | None = None  # added to their numbers, where these begin anew
+        self.seen: Observation | None = None  # the last scan taken, as it was observed
         self._is_finished = False
 
     def add(self, scan: Scan) -> Placement:
@@ -183,23 +193,30 @@ class Mapper:
             b"" if empty else MapSnapshot.packed(self._growing),
         )
 
+    @property
+    def _has_finished(self) -> bool:
+        """Whether a submap of this run is finished."""
+        return len(self._finished) > self._known
+
     def _numbered(self, scan: Scan) -> Scan:
         """Return `scan` with its index, which may be the next; errors as of `add`."""
         if self._is_finished:
             raise FinishedError(self.robot)
-        index = self._next_index if scan.index == UNNUMBERED else scan.index
+        if self._shift is None:
+            self._shift = self._next_index if scan.index < self._next_index else 0
+        index = self._next_index if scan.index == UNNUMBERED else scan.index + self._shift
         if index < self._next_index:
             raise ArgumentError(
                 "scan", f"expected an index of {self._next_index} or more, got {index}"
             )
         self._next_index = index + 1
-        return replace(scan, index=index) if scan.index == UNNUMBERED else scan
+        return scan if scan.index == index else replace(scan, index=index)
 
     def _take(self, scan: Scan) -> tuple[bool, bool]:
         """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
-        if not self._finished:
+        if not self._has_finished:
             self._early.append(scan)
-        seen = observe(self._body.without(scan), self.parameters.observation)
+        seen = self.seen = observe(self._body.without(scan), self.parameters.observation)
         placed = self._place(seen)
         if len(self._tracker.missed) < self._patience(seen):
             return placed, False
@@ -211,7 +228,7 @@ class Mapper:
 
         Not where it sees nothing: what it sees of itself is not what it was lost by.
         """
-        undecided = not self._finished and self._body.is_suspected
+        undecided = not self._has_finished and self._body.is_suspected
         undecided &= not self._tracker.is_blind(seen)
         return self.parameters.patience * (SUSPENSE if undecided else 1)
 
@@ -221,7 +238,7 @@ class Mapper:
         What is in a finished submap stays as it is.
         """
         self._say_body()
-        if self._finished:
+        if self._has_finished:
             return
         early = list(self._early)
         self._early.clear()
@@ -246,7 +263,7 @@ class Mapper:
 
     def _place(self, seen: Observation) -> bool:
         """Follow the robot to a scan; merge it, and those missed before it."""
-        found = self._tracker.place(seen, self._known)
+        found = self._tracker.place(seen, self._lines_around)
         self._merge_all(found)
         return any(each is seen for each, _ in found)
 
@@ -259,7 +276,7 @@ class Mapper:
         for seen, tracked in found:
             self._merge(seen, tracked)
 
-    def _known(self) -> LineMap:
+    def _lines_around(self) -> LineMap:
         """G_(t-1): the lines around the robot, tracker's frame."""
         growing = [] if self._growing.is_empty else [self._growing.lines().moved(self._frame)]
         to_tracker = se2.inverse(self._origin)

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.mapping.continuation import links_to_keep
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.maps import Submap, Trajectory
 
@@ -41,6 +42,9 @@ class SubmapGraphParameters(BaseModel):
     )
     joining_sigma: float = Field(0.1, gt=0, description="[m] of components joined by their shapes")
     joining_turn: float = Field(0.01, gt=0, description="[rad] of components joined")
+    kept_near: float = Field(
+        6.0, gt=0, description="[m] between submaps of an earlier run that stay as they lie"
+    )
     reach: int = Field(80, ge=2, description="submaps that a closure moves, the fewest links away")
     long_loop: int = Field(
         40, ge=1, description="links round a loop from which on all submaps are moved"
@@ -63,6 +67,17 @@ class SubmapGraph:
         self._trust(
             Constraint(previous.id, submap.id, step, covariance, True), submap.trajectory.length
         )
+
+    def take_over(self, submaps: Sequence[Submap]) -> None:
+        """Note how submaps of an earlier run lie to each other: those that follow, or are near.
+
+        What held them there is not stored; where they lie is what all of it came to.
+        """
+        covariance = joining_covariance(self._parameters)
+        for first, second in links_to_keep(submaps, self._parameters.kept_near):
+            step = se2.between(first.pose, second.pose)
+            length = second.trajectory.length if second.id == first.id + 1 else CLOSURE_LENGTH
+            self._trust(Constraint(first.id, second.id, step, covariance, True), length)
 
     def part(self, submaps: Sequence[Submap], first: int) -> list[Submap]:
         """Forget all links between those of `submaps` before number `first` and the others.

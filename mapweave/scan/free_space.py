@@ -125,6 +125,19 @@ def unite(pieces: Sequence[FloatArray], parameters: FreeSpaceParameters) -> Base
     return _opened(_outlined(filled_cells(pieces, *grid), grid), p)
 
 
+def free_cells(free: BoolArray, cell: float, parameters: FreeSpaceParameters) -> BaseGeometry:
+    """Return what the (rows, columns) cells that are `free` cover, as `unite` does.
+
+    Parameters
+    ----------
+    cell
+        [m]; the first cell of the first row has its corner at the origin, and rows go along y.
+    """
+    along_x: BoolArray = np.ascontiguousarray(free.T)
+    grid = Grid(np.zeros(2), cell, *along_x.shape)
+    return _opened(_outlined(along_x, grid), parameters)
+
+
 def _outlined(free: BoolArray, grid: Grid) -> BaseGeometry:
     """Return what the cells that are `free` cover: the steps of its edge made straight."""
     taken: Floats32 = np.ones((grid.rows + 2, grid.columns + 2), dtype=np.float32)

@@ -12,6 +12,7 @@ from mapweave.config import Config
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.mapping.mapper import MapperParameters
 from mapweave_agent import command, taking_up
+from mapweave_agent.stored import mappers
 
 
 def test_mapper_backend_comparisons_and_log_get_what_the_configuration_says(
@@ -24,6 +25,8 @@ def test_mapper_backend_comparisons_and_log_get_what_the_configuration_says(
         name: Mock(return_value=nullcontext())
         for name in ("ComparisonWorker", "BackendProcess", "open_session")
     }
+    backend = made.pop("BackendProcess")
+    monkeypatch.setattr(mappers, "BackendProcess", backend)
     monkeypatch.setattr(taking_up, "ask_robot_map", Mock(return_value=None))
     for name, mock in {**made, "AgentRun": (agent := Mock())}.items():
         monkeypatch.setattr(command, name, mock)
@@ -32,8 +35,7 @@ def test_mapper_backend_comparisons_and_log_get_what_the_configuration_says(
     mapper = agent.call_args.args[2]
     assert mapper.parameters == MapperParameters.of(config)
     assert mapper.robot_map().made_with.config == config.values()
-    (backend,) = made["BackendProcess"].call_args.args
-    assert backend == mapper.parameters.backend
+    assert backend.call_args.args == (mapper.parameters.backend, ())
     (compare,) = made["ComparisonWorker"].call_args.args
     assert compare.func is align
     assert compare.keywords == {"parameters": FusionParameters.of(config)}

@@ -27,6 +27,10 @@ def ids(of: RobotMap) -> list[int]:
     return [submap.id for submap in without_strays(of).submaps]
 
 
+def test_a_stored_component_that_no_scan_of_this_run_is_in_stays() -> None:
+    assert ids(robot_map((0, 0), (1, 1), (2, 5))) == [0, 2]
+
+
 def test_a_component_of_one_scan_is_left_out() -> None:
     assert ids(robot_map((0, 9), (1, 1), (2, 4))) == [0, 2]
 

@@ -3,6 +3,7 @@
 The maps are of an L-shaped room, seen by robots that never were.
 """
 
+import resource
 import secrets
 import signal
 import socket
@@ -132,6 +133,12 @@ class ServerProcess:
             assert self._process.poll() is None, self.log
             assert time.monotonic() < deadline, self.log
             time.sleep(0.02)
+
+    def limit_files(self, size: int | None) -> None:
+        """Let no file it writes grow beyond `size` [bytes], as if the disk were full."""
+        _, hard = resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE)
+        soft = resource.RLIM_INFINITY if size is None else size
+        resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE, (soft, hard))
 
     def stop(self, how: int = signal.SIGINT) -> int:
         """Signal it, wait for its end, and return its exit status."""

@@ -93,7 +93,7 @@ def test_an_unknown_command_is_wrong_usage_and_the_known_ones_are_named(
     assert main(["frobnicate"]) == cli.EXIT_USAGE
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "'frobnicate'" in said and "export, fuse, map" in said
+    assert "'frobnicate'" in said and "export, fuse, history, map" in said
 
 
 @pytest.mark.parametrize(

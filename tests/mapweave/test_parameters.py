@@ -66,6 +66,7 @@ MEASURED: dict[str, dict[str, object]] = {
         "sight": 12.0,
         "far_sight": 25.0,
     },
+    "LocalizerParameters": {},
     "LoopParameters": {"reach": 12.0, "residual": 0.15},
     "MapperParameters": {"patience": 5},
     "MergingParameters": {"max_step": 0.12, "max_gap": 0.3, "end_noise": 0.05, "max_shift": 0.03},
@@ -80,6 +81,7 @@ MEASURED: dict[str, dict[str, object]] = {
     },
     "OwnBodyParameters": {"still": 0.06, "moved": 0.1, "edge": 0.25, "depth": 0.1},
     "PartParameters": {"length": 36.0},
+    "PlaceFinderParameters": {},
     "PlaceRecognitionParameters": {},
     "PoseCovarianceParameters": {"noise": 0.1},
     "ReachabilityParameters": {
@@ -88,6 +90,7 @@ MEASURED: dict[str, dict[str, object]] = {
         "slack": 0.25,
         "turn_slack": 0.26,
     },
+    "RecentScansParameters": {"step": 0.3, "turn": 0.26},
     "SegmentConfidenceParameters": {"spacing": 0.2, "closeness": 0.3, "clearance": 0.3},
     "SegmentationParameters": {"max_range": 30.0, "tolerance": 0.04},
     "SelectionParameters": {"tolerance": 0.09},

@@ -50,6 +50,7 @@ class Api:
             Route("/api/joint/{number:int}.{suffix}", self._file),
             Route("/api/versions", self._versions),
             Route("/api/robots", self._robots),
+            Route("/api/poses", self._poses),
             Route("/api/parts/{robot}/{component:int}", self._part),
             Route("/api/alignments", self._alignments),
             Route("/api/story", self._story),
@@ -146,6 +147,9 @@ class Api:
 
     async def _robots(self, _request: Request) -> Response:
         return _json(self._known.team_json())
+
+    async def _poses(self, _request: Request) -> Response:
+        return _json(to_json(self._known.feed.positions.content()))
 
     async def _alignments(self, _request: Request) -> Response:
         return _json(await run_in_threadpool(self._alignments_json))

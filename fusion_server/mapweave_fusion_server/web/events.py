@@ -2,13 +2,15 @@
 
 An event ``version`` for each version, its number as the event's id: who comes again with the last
 id it had (as browsers do by themselves) gets all that it missed, in order. Beside these, without an
-id: ``team`` when robots or coordinator were reported, ``story`` with lines of the journal.
+id: ``team`` when robots or coordinator were reported, ``story`` with lines of the journal,
+``poses`` where the robots are, ten times a second at the most.
 
 Each client is served at its own pace from the store; nothing is queued for a slow one.
 """
 
 import asyncio
 from collections.abc import AsyncIterator
+from contextlib import suppress
 
 from starlette.concurrency import run_in_threadpool
 
@@ -17,6 +19,7 @@ from mapweave_fusion_server.web.knowledge import Knowledge
 
 AT_ONCE = 256  # versions read from the store
 PING = 15.0  # [s] after which a client that is gone is noticed
+PACE = 0.1  # [s] between two looks at where the robots are
 RETRY = "retry: 1000\n\n"  # [ms] after which a browser comes again
 
 
@@ -70,6 +73,7 @@ class Stream:
         self._version = max(0, latest - 1) if after is None or after > latest else after
         self._line = knowledge.story.count
         self._team = b""
+        self._poses = 0
 
     async def __aiter__(self) -> AsyncIterator[bytes]:
         """Yield events until the server closes."""
@@ -80,10 +84,8 @@ class Stream:
             bell = self._bell.next
             async for event in self._news():
                 yield event
-            try:
-                await asyncio.wait_for(bell.wait(), PING)
-            except TimeoutError:
-                yield b": still here\n\n"
+            async for event in self._moves(bell):
+                yield event
 
     async def _news(self) -> AsyncIterator[bytes]:
         while created := await run_in_threadpool(self._versions):
@@ -99,6 +101,21 @@ class Stream:
         if lines:
             self._line = lines[-1]["number"]
             yield _event("story", to_json({"lines": lines}))
+
+    async def _moves(self, bell: asyncio.Event) -> AsyncIterator[bytes]:
+        """Yield where the robots are, as long as there is no other news; then return."""
+        silent = 0.0
+        while not bell.is_set():
+            positions = self._knowledge.feed.positions
+            if positions.count != self._poses:
+                self._poses, silent = positions.count, 0.0
+                yield _event("poses", to_json(positions.content()))
+            elif silent > PING:
+                silent = 0.0
+                yield b": still here\n\n"
+            with suppress(TimeoutError):  # no news but of where they are
+                await asyncio.wait_for(bell.wait(), PACE)
+            silent += PACE
 
     @property
     def _history(self) -> History:

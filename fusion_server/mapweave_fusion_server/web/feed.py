@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 from mapweave.maps import RobotMap
+from mapweave_fusion_server.web.positions import Positions
 from mapweave_protocol.wire.messages import StatusMessage
 
 
@@ -82,9 +83,15 @@ class Feed:
     """Keeps what was handed over last, and tells those who listen; usable from several threads.
 
     A listener is called in the thread of the coordinator, and must return at once.
+
+    Attributes
+    ----------
+    positions
+        Where the robots are now: these come past the coordinator, at the rate of scans.
     """
 
     def __init__(self) -> None:
+        self.positions = Positions()
         self._lock = threading.Lock()
         self._seen = Seen()
         self._listeners: tuple[Listener, ...] = ()

@@ -41,7 +41,8 @@ def ask_latest(
     MessageError
         If an answer is not valid.
     """
-    replies = list(session.get(JOINT_QUERY.build(team=team), timeout=timeout))
+    selector, each = JOINT_QUERY.build(team=team), zenoh.ConsolidationMode.NONE
+    replies = list(session.get(selector, consolidation=each, timeout=timeout))
     maps = [decode(JointMapMessage, reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
     return max(maps, key=lambda message: message.version, default=None), bool(replies)
 

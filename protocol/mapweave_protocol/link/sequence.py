@@ -1,6 +1,11 @@
-"""Joint maps in the order of their versions, without a gap and none twice; no network in here."""
+"""Joint maps in the order of their versions, without a gap and none twice; no network in here.
 
-from collections import deque
+Anybody may publish what looks like a version, so what is published is a hint: whether there is one
+so far ahead, and which numbering is the team's, is what the coordinator answers when it is asked.
+"""
+
+import math
+from collections.abc import Sequence
 
 from mapweave.maps import JointMap
 from mapweave_protocol.wire.messages import JointMapMessage
@@ -10,7 +15,7 @@ MAX_WAITING = 64
 ASKED_AT_ONCE = 32  # versions: a long history comes in portions
 SHORT_HISTORY = 16  # versions: what a coordinator's cache holds
 MAX_TRIES = 5
-REMEMBERED_SERIES = 16
+ASKED_AFTER, ASKED_AFTER_AT_MOST = 1.0, 60.0  # [s] before it is asked again whose series counts
 
 
 class JointSequence:
@@ -28,36 +33,60 @@ class JointSequence:
         self._last: int | None = None
         self._newest = 0
         self._series: str | None = None
-        self._past: deque[str] = deque(maxlen=REMEMBERED_SERIES)
         self._waiting: dict[int, JointMapMessage] = {}
         self._tries = 0
+        self._strangers = _Strangers()
 
     @property
     def gap(self) -> JointQuery | None:
         """What to ask for before anything can be delivered; None if nothing is missing."""
+        if self._strangers.is_to_ask:
+            return JointQuery()
         if self._newest <= (self._last or 0):
             return None
-        if self._last is None:
-            return JointQuery()
+        if self._last is None or self._tries == MAX_TRIES - 1:
+            return JointQuery()  # is there such a version at all?
         return JointQuery(since=self._last, limit=ASKED_AT_ONCE)
 
-    def offer(self, message: JointMapMessage) -> None:
-        """Take in `message`, unless it is old."""
-        if not self._follow(message.series):
-            return
-        if self._last is None:
-            self._last = 0 if message.version <= self._whole_up_to else message.version - 1
-        self._newest = max(self._newest, message.version)
-        if message.version > self._last:
-            self._waiting[message.version] = message
-        while len(self._waiting) > MAX_WAITING:
-            # The newest can be asked for again.
-            del self._waiting[max(self._waiting)]
+    def offer(self, message: JointMapMessage, now: float = 0.0) -> None:
+        """Take in `message`, which somebody published, unless it is old or of another series.
 
-    def expect(self, series: str, version: int) -> None:
-        """Note that there is a version, whether or not it arrives; another series is none of it."""
+        Parameters
+        ----------
+        now
+            [s] by any clock that is not set.
+        """
+        if self._series is None:
+            self._series = message.series
+        if message.series != self._series:
+            self._strangers.spoke(now)
+            return
+        self._strangers.own_spoke()
+        self._take_in(message)
+
+    def answered(
+        self, query: JointQuery, messages: Sequence[JointMapMessage], now: float = 0.0
+    ) -> None:
+        """Take in the answers to `query`; `now` as of `offer`."""
+        if query == JointQuery():
+            self._strangers.answered(now)
+            self._follow({message.series for message in messages})
+        else:
+            self._pass_over_history(messages)
+        own = [message for message in messages if message.series == self._series]
+        for message in own:
+            self._take_in(message)
+        if own and query == JointQuery():
+            self._believe(max(message.version for message in own))
+            self._tries *= int(self._newest > (self._last or 0))
+
+    def expect(self, series: str, version: int, now: float = 0.0) -> None:
+        """Note that there is a version, whether or not it arrives; of another series none is."""
         if self._series in (None, series):
+            self._strangers.own_spoke()
             self._newest = max(self._newest, version)
+        else:
+            self._strangers.spoke(now)
 
     def take(self) -> JointMap | None:
         """Return the next joint map, None if it is not here."""
@@ -70,26 +99,77 @@ class JointSequence:
     def give_up(self) -> int:
         """Count a try to close the gap that did not help; skip the gap after several.
 
+        Where nobody has answered, what is far ahead is forgotten instead: it may be of nobody.
+
         Returns
         -------
         int
             How many versions were skipped.
         """
         self._tries += 1
-        if self._tries < MAX_TRIES or not self._waiting:
+        if self._tries < MAX_TRIES:
             return 0
-        skipped = min(self._waiting) - 1 - (self._last or 0)
+        self._tries, last = 0, self._last or 0
+        self._believe(min(self._newest, max(last, self._whole_up_to) + MAX_WAITING))
+        if not self._waiting:
+            self._newest = last
+            return 0
         self._last = min(self._waiting) - 1
-        return skipped
+        return self._last - last
 
-    def _follow(self, series: str) -> bool:
-        """Tell whether `series` is the one to follow; a new one has numbers of its own."""
-        if series in self._past:
-            return False
-        if self._series is not None and series != self._series:
-            self._past.append(self._series)
-            self._waiting.clear()
-            self._last, self._newest, self._tries = None, 0, 0
-            self._whole_up_to = SHORT_HISTORY
-        self._series = series
-        return True
+    def _take_in(self, message: JointMapMessage) -> None:
+        if self._last is None:
+            self._last = 0 if message.version <= self._whole_up_to else message.version - 1
+        self._newest = max(self._newest, message.version)
+        if message.version > self._last:
+            self._waiting[message.version] = message
+        while len(self._waiting) > MAX_WAITING:
+            # The newest can be asked for again.
+            del self._waiting[max(self._waiting)]
+
+    def _follow(self, answering: set[str]) -> None:
+        """Follow another series where the coordinator that answers has another one."""
+        if not answering or self._series in answering:
+            return
+        before, self._series = self._series, min(answering)
+        if before is None:
+            return
+        self._waiting.clear()
+        self._last, self._newest, self._tries = None, 0, 0
+        self._whole_up_to = SHORT_HISTORY
+        self._strangers = _Strangers()
+
+    def _believe(self, latest: int) -> None:
+        """Forget what is said to come after the version `latest`."""
+        self._newest = max(latest, self._last or 0)
+        self._waiting = {n: message for n, message in self._waiting.items() if n <= latest}
+
+    def _pass_over_history(self, messages: Sequence[JointMapMessage]) -> None:
+        """Where a store began another series, what is of the one before is history."""
+        before = [m.version for m in messages if m.series != self._series]
+        if before and self._last is not None and self._last < max(before) <= SHORT_HISTORY:
+            self._last = max(before)
+
+
+class _Strangers:
+    """When to ask whose series counts: ever more rarely, while the one that is followed speaks."""
+
+    def __init__(self) -> None:
+        self.is_to_ask = False
+        self._due = -math.inf
+        self._wait = ASKED_AFTER
+        self._has_own_spoken = False
+
+    def spoke(self, now: float) -> None:
+        """Note that something came of another series."""
+        self.is_to_ask |= now >= self._due
+
+    def own_spoke(self) -> None:
+        """Note that something came of the series that is followed."""
+        self._has_own_spoken = True
+
+    def answered(self, now: float) -> None:
+        """Note that it was asked."""
+        longer = min(2 * self._wait, ASKED_AFTER_AT_MOST)
+        self._wait = longer if self._has_own_spoken else ASKED_AFTER
+        self.is_to_ask, self._has_own_spoken, self._due = False, False, now + self._wait

@@ -196,7 +196,7 @@ def _expect(sequence: JointSequence, said: Inbox) -> None:
     while (arrival := said.get(0.0)) is not None:
         status = reader.read(arrival)
         if status is not None:
-            sequence.expect(status.series, status.version)
+            sequence.expect(status.series, status.version, time.monotonic())
 
 
 def _in_order(
@@ -209,7 +209,7 @@ def _in_order(
     yield from iter(sequence.take, None)
     for new in messages:
         if new is not None:
-            sequence.offer(new)
+            sequence.offer(new, time.monotonic())
         yield from iter(sequence.take, None)
         expect()
         yield from _close_gap(sequence, ask)
@@ -220,9 +220,10 @@ def _close_gap(
 ) -> Iterator[JointMap]:
     """Yield what is missing as long as it comes."""
     while (gap := sequence.gap) is not None:
-        for message in ask(gap):
-            sequence.offer(message)
+        sequence.answered(gap, ask(gap), time.monotonic())
         filled = sequence.take()
+        if filled is None and sequence.gap is None:
+            return
         if filled is None:
             skipped = sequence.give_up()
             if skipped:

@@ -20,7 +20,7 @@ from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.feed import Feed
 from mapweave_fusion_server.web.server import live_page
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.messages import JointMapMessage
+from mapweave_protocol.wire.messages import JointMapMessage, PoseMessage
 
 TOKEN = "only-who-reads-the-terminal-knows"
 PATIENCE = 30.0  # [s]
@@ -136,6 +136,14 @@ def make_joint(
         for name in names[1:]
     )
     return JointMap(version, (component,), alignments)
+
+
+def make_pose(robot: str, x: float, *, found: bool = True) -> PoseMessage:
+    """Return a robot's word that it is at `x` [m] of its component 0."""
+    return PoseMessage(
+        robot=robot, boot="b", stamp=None, sent=9.0, scan_index=0, found=found,
+        component=f"{robot}/0", pose=(x, 0.0, 0.0), covariance=(0.0,) * 9,
+    )  # fmt: skip
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed, RobotReport
 from mapweave_fusion_server.web.server import live_page
 from tests.fusion_server.web.browser import Visit, chromium, visit
-from tests.fusion_server.web.conftest import TOKEN, Page, make_joint
+from tests.fusion_server.web.conftest import TOKEN, Page, make_joint, make_pose
 
 pytestmark = pytest.mark.slow
 HOSTILE = "<img src=x onerror=alert(1)></script><b id=bold>"
@@ -94,6 +94,37 @@ RECORD_MOVES = """() => {
     return original.apply(this, all);
   };
 }"""
+
+
+def test_a_robot_stands_where_it_says_it_is_and_on_an_old_version_where_it_was(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    page.publish(make_joint(1, lines, a=0.0))
+    page.publish(make_joint(2, lines, a=0.0))
+    page.feed.show_team((RobotReport("a", 1, None, None, None),), CoordinatorReport())
+    expect_version(seen.tab, 2)
+    seen.tab.wait_for_timeout(300)
+    empty = picture(seen.tab)
+    page.feed.positions.take(make_pose("a", 1.0))
+    first = until_other(seen.tab, empty)
+    page.feed.positions.take(make_pose("a", 2.0))
+    second = until_other(seen.tab, first)
+    page.feed.positions.take(make_pose("a", 2.0, found=False))
+    lost = until_other(seen.tab, second)
+    assert len({empty, first, second, lost}) == 4
+    seen.tab.locator("#version").fill("1")
+    expect_version(seen.tab, 1)
+    assert until_other(seen.tab, lost) == empty  # of this version no paths are kept
+
+
+def until_other(tab: Tab, shown: bytes) -> bytes:
+    """Return the first picture that differs from `shown`."""
+    for _ in range(100):
+        if picture(tab) != shown:
+            tab.wait_for_timeout(200)
+            return picture(tab)
+        tab.wait_for_timeout(100)
+    raise AssertionError("the picture stays")
 
 
 def test_the_slider_goes_back_and_the_map_is_that_versions(

@@ -9,7 +9,7 @@ from mapweave.maps import LineMap
 from mapweave_fusion_server import journal
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_fusion_server.web.parts import Paths
-from tests.fusion_server.web.conftest import Page, make_joint
+from tests.fusion_server.web.conftest import Page, make_joint, make_pose
 
 
 def publish(page: Page, lines: LineMap, first: int, last: int) -> None:
@@ -65,6 +65,22 @@ def test_reports_and_lines_are_told_without_an_id(
     assert json.loads(team["data"])["coordinator"]["stamp"] == 5.0
     assert "id" not in story
     assert "id" not in team
+
+
+def test_where_a_robot_is_is_told_when_it_says_so_and_only_then(page: Page) -> None:
+    with page.events() as events:
+        assert next(events)["event"] == "team"
+        page.feed.positions.take(make_pose("r1", 1.0))
+        first = next(events)
+        page.feed.positions.take(make_pose("r1", 2.0))
+        second = next(events)
+        page.feed.show_team((), CoordinatorReport(stamp=5.0))
+        assert next(events)["event"] == "team"
+    assert [first["event"], second["event"]] == ["poses", "poses"]
+    assert "id" not in first
+    robots = [json.loads(event["data"])["robots"] for event in (first, second)]
+    assert [robot["r1"]["pose"] for robot in robots] == [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
+    assert page.ask("/api/poses").json == {"robots": robots[1]}
 
 
 def test_paths_are_there_when_their_version_is_told(page: Page, lines: LineMap) -> None:

@@ -126,7 +126,7 @@ def test_free_space_makes_the_difference(seed: int) -> None:
     by_walls, _ = compared(*twins(free=False), seed)
     by_all, _ = compared(*twins(free=True), seed)
     assert by_walls.decision != "refused"
-    assert by_walls.confidence > 0.8
+    assert by_walls.confidence > 0.7
     assert by_all.decision == "refused"
     assert by_all.confidence < 0.2
 

@@ -68,6 +68,31 @@ def test_two_equal_rooms_are_never_joined_and_never_sure(
     assert found.confidence < 0.85
 
 
+@pytest.mark.parametrize("spaceless", [(True, False), (False, True), (True, True)])
+def test_a_room_whose_free_space_is_not_known_is_a_room_all_the_same(
+    spaceless: tuple[bool, bool],
+) -> None:
+    lines = inside(room(5.0, 6.0, 1.5, 3.0))
+    odd = line_map(np.vstack([lines.segments, [[0.0, 3.0, 2.0, 3.0]]]), lines.free_space)
+    there = odd.moved(np.array([3.0, 1.0, 2.0]))
+    one, two = (
+        replace(known, free_space=()) if bare else known
+        for known, bare in zip((odd, there), spaceless, strict=True)
+    )
+    found = align_maps(("a/0", one), ("b/0", two), P)
+    assert found.decision == "ambiguous"
+    assert found.confidence < 0.85
+
+
+def test_walls_of_more_than_a_room_prove_a_place_without_free_space() -> None:
+    left, right = part(BUILDING, 0, 18), part(BUILDING, 5, 30)
+    bare = replace(left, free_space=()), replace(right, free_space=())
+    one, two = (prepare(each, P) for each in bare)
+    assert one is not None
+    assert two is not None
+    assert outside(one.raster, two.raster, se2.IDENTITY, P.verification, P.rooms) == math.inf
+
+
 def test_a_room_that_nothing_else_fits_is_told_to_be_one_room() -> None:
     lines = inside(room(5.0, 6.0, 1.5, 3.0))
     odd = replace(lines, segments=np.vstack([lines.segments, [[0.0, 3.0, 2.0, 3.0]]]))

@@ -29,8 +29,7 @@ def ask_the_store(sequence: JointSequence, store: range) -> None:
     if gap is not None:
         since = store[-2] if gap.since is None else gap.since
         wanted = [version for version in store if version > since]
-        for version in wanted[: gap.limit]:
-            sequence.offer(message(version))
+        sequence.answered(gap, [message(version) for version in wanted[: gap.limit]])
 
 
 def delivered_until_quiet(sequence: JointSequence, store: range) -> list[int]:
@@ -110,11 +109,13 @@ def test_a_version_that_is_only_told_of_is_asked_for() -> None:
     assert delivered_until_quiet(sequence, range(1, 9)) == [8]
 
 
-def test_what_is_told_of_another_series_is_not_asked_for() -> None:
+def test_what_is_told_of_another_series_is_asked_for_only_where_that_one_counts() -> None:
     sequence = JointSequence(whole_up_to=0)
     sequence.offer(message(7))
     assert taken(sequence) == [7]
     sequence.expect("s2", 9)
+    assert sequence.gap == JointQuery()
+    sequence.answered(JointQuery(), [message(7)])
     assert sequence.gap is None
 
 
@@ -126,11 +127,88 @@ def test_a_gap_that_nobody_can_close_is_skipped_after_some_tries() -> None:
     assert taken(sequence) == [5]
 
 
-def test_another_store_counts_from_one_again_and_the_old_one_is_not_heard_any_more() -> None:
+def test_another_store_is_followed_once_its_coordinator_answers() -> None:
     sequence = JointSequence(whole_up_to=0)
-    for new in (message(9), message(1, "s2"), message(10), message(2, "s2")):
+    sequence.offer(message(9))
+    assert taken(sequence) == [9]
+    sequence.offer(message(1, "s2"))
+    assert taken(sequence) == []
+    assert sequence.gap == JointQuery()
+    sequence.answered(JointQuery(), [message(1, "s2")])
+    for new in (message(10), message(2, "s2")):
         sequence.offer(new)
     assert taken(sequence) == [1, 2]
+
+
+def test_the_series_followed_before_is_followed_again_when_it_is_the_one_that_answers() -> None:
+    sequence = JointSequence(whole_up_to=0)
+    sequence.offer(message(9))
+    for time, series in enumerate(("s2", "s1", "s2")):
+        sequence.offer(message(20 + time, series), now=10.0 * time)
+        sequence.answered(JointQuery(), [message(20 + time, series)], now=10.0 * time)
+        assert taken(sequence)[-1:] == [20 + time]
+
+
+def test_a_series_of_nobody_takes_nothing_from_the_one_that_is_followed() -> None:
+    sequence = JointSequence(whole_up_to=0)
+    sequence.offer(message(1))
+    delivered, asked = taken(sequence), 0
+    for version in range(2, 100):
+        for forged in range(50):
+            now = version + forged / 50  # [s]: a version a second, 50 forged ones between
+            sequence.offer(message(10_000 + forged, "forged"), now)
+            if sequence.gap is not None:
+                asked += 1
+                sequence.answered(sequence.gap, [message(version - 1)], now)
+        sequence.offer(message(version), version)
+        delivered += taken(sequence)
+    assert delivered == list(range(1, 100))
+    assert asked < 12
+
+
+@pytest.mark.parametrize("how", ["published", "told"])
+@pytest.mark.parametrize("far", [12, 300, 2**53])
+def test_a_forged_version_far_ahead_is_not_waited_for_and_skips_nothing(how: str, far: int) -> None:
+    sequence = JointSequence(whole_up_to=0)
+    delivered: list[int] = []
+    for version in range(5, 40):
+        sequence.offer(message(version))
+        if version == 10:
+            if how == "told":
+                sequence.expect("s1", far)
+            else:
+                sequence.offer(message(far))
+        delivered += taken(sequence)
+        for _ in range(3 * MAX_TRIES):
+            ask_the_store(sequence, range(1, version + 1))
+            if sequence.gap is None:
+                break
+            sequence.give_up()
+        assert sequence.gap is None, "nothing is asked for for ever"
+    if how == "told" or far > 40:
+        assert delivered == list(range(5, 40))
+    assert delivered[-1] == 39
+
+
+def test_what_is_far_ahead_is_forgotten_where_nobody_answers() -> None:
+    sequence = JointSequence(whole_up_to=0)
+    for version in (5, 2**53):
+        sequence.offer(message(version))
+    assert taken(sequence) == [5]
+    for _ in range(MAX_TRIES):
+        assert sequence.give_up() == 0
+    assert sequence.gap is None
+    sequence.offer(message(6))
+    assert taken(sequence) == [6]
+
+
+def test_versions_of_an_earlier_series_of_the_store_are_not_waited_for() -> None:
+    sequence = JointSequence(whole_up_to=SHORT_HISTORY)
+    sequence.offer(message(7, "s2"))
+    gap = sequence.gap
+    assert gap == JointQuery(since=0, limit=ASKED_AT_ONCE)
+    sequence.answered(gap, [*(message(n) for n in range(1, 6)), message(6, "s2")])
+    assert taken(sequence) == [6, 7]
 
 
 def test_no_more_than_so_many_wait() -> None:

@@ -113,8 +113,8 @@ export function drawPart(context, part, robot, px) {
   context.globalAlpha = 1;
 }
 
-/** Draw a robot at `pose` on the sheet: an arrowhead; hollow when it is gone. */
-export function drawRobot(context, camera, pose, robot, alive) {
+/** Draw a robot at `pose` on the sheet: an arrowhead; hollow when it is gone or lost. */
+export function drawRobot(context, camera, pose, robot, state) {
   const [u, v] = camera.toScreen(pose[0], pose[1]);
   const [tipU, tipV] = camera.toScreen(...move(pose, 1, 0));
   context.save();
@@ -127,7 +127,7 @@ export function drawRobot(context, camera, pose, robot, alive) {
   context.strokeStyle = theme().paper;
   context.lineWidth = 5;
   context.stroke();
-  context.fillStyle = alive ? colourOf(robot) : theme().paper;
+  context.fillStyle = state === "here" ? colourOf(robot) : theme().paper;
   context.fill();
   context.strokeStyle = colourOf(robot);
   context.lineWidth = 2;
@@ -136,8 +136,8 @@ export function drawRobot(context, camera, pose, robot, alive) {
 }
 
 /** Write a robot's name beside it, where no other of `taken` is; take that place. */
-export function drawTag(context, camera, pose, robot, alive, taken) {
-  const text = alive ? robot : `${robot} · gone`;
+export function drawTag(context, camera, pose, robot, state, taken) {
+  const text = state === "here" ? robot : `${robot} · ${state}`;
   const [u, v] = camera.toScreen(pose[0], pose[1]);
   context.font = `600 ${FONT}`;
   const width = context.measureText(text).width + 12;

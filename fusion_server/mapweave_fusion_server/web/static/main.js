@@ -56,7 +56,7 @@ async function load(version) {
 function show(joint, paths) {
   const names = joint.components.flatMap((component) => Object.keys(component.robots));
   setRobots([...names.map(robotOf), ...(state.team?.robots ?? []).map(({ robot }) => robot)]);
-  map.show(joint, paths);
+  map.show(joint, paths, timeline.isLatest);
   byId("no-paths").hidden = paths.kept;
   const scenes = map.stage.actors.map((actor) => actor.scene);
   decisions.show(joint);
@@ -199,7 +199,7 @@ async function begin() {
   writeLegend();
   await timeline.load();
   timeline.follow(hash);
-  follow({ version: (event) => timeline.add(event), team: showTeam, story: ({ lines }) => addLines(lines), contact: onContact });
+  follow({ version: (event) => timeline.add(event), team: showTeam, story: ({ lines }) => addLines(lines), poses: ({ robots }) => map.setPoses(robots), contact: onContact });
 }
 
 begin();

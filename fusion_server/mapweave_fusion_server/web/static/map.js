@@ -26,6 +26,8 @@ export class MapView {
   #tracks = new Map();
   #places = {};
   #alive = new Map();
+  #poses = {};
+  #isNow = true;
   #parts = new Map();
   #changes = null;
   #glide = null;
@@ -46,8 +48,9 @@ export class MapView {
     this.#resize();
   }
 
-  /** Show a version with its paths. */
-  show(joint, paths) {
+  /** Show a version with its paths; `isNow`: robots stand where they are, not where they were. */
+  show(joint, paths, isNow) {
+    this.#isNow = isNow;
     this.stage.show(joint, performance.now(), this.camera.width / Math.max(1, this.camera.height));
     this.#changes = null;
     this.#tracks = new Map(Object.entries(paths.components).map(([name, { paths: runs, last }]) =>
@@ -68,12 +71,19 @@ export class MapView {
 
   /** Whether robots are on the map. */
   get hasRobots() {
-    return this.layers.paths && Object.keys(this.#places).length > 0;
+    return this.layers.paths && this.#robots.length > 0;
   }
 
   /** Say which robots are alive. */
   setAlive(robots) {
     this.#alive = new Map(robots.map((robot) => [robot.robot, robot.alive]));
+    this.refresh();
+  }
+
+  /** Take where the robots are now, each in its own component. */
+  setPoses(robots) {
+    this.#poses = robots;
+    this.#follow();
     this.refresh();
   }
 
@@ -131,9 +141,25 @@ export class MapView {
 
   /** Return where a robot is on the sheet, null where that is not known. */
   robotPose(robot, cast = this.stage.cast(performance.now())) {
-    const name = this.#places[robot], last = this.#tracks.get(name)?.last;
+    const now = this.#isNow && this.#onSheet(this.#poses[robot]?.component, this.#poses[robot]?.pose, cast);
+    const name = this.#places[robot];
+    return now || this.#onSheet(name, this.#tracks.get(name)?.last, cast);
+  }
+
+  /** Return where a pose in a component's own frame is on the sheet, null where that is not shown. */
+  #onSheet(name, pose, cast) {
     const found = cast.filter(({ scene }) => scene.robots.has(name)).sort((a, b) => b.opacity - a.opacity)[0];
-    return last && found ? compose(compose(found.pose, found.scene.robots.get(name)), last) : null;
+    return pose && found ? compose(compose(found.pose, found.scene.robots.get(name)), pose) : null;
+  }
+
+  get #robots() {
+    return [...new Set([...Object.keys(this.#places), ...(this.#isNow ? Object.keys(this.#poses) : [])])];
+  }
+
+  /** Tell whether a robot is here, lost (its last scan fitted nowhere), or gone. */
+  #stateOf(robot) {
+    if (!(this.#alive.get(robot) ?? false)) return "gone";
+    return this.#isNow && this.#poses[robot]?.found === false ? "lost" : "here";
   }
 
   #free(change) {
@@ -240,7 +266,7 @@ export class MapView {
   }
 
   #drawRobots(context, cast) {
-    const there = Object.keys(this.#places).map((robot) => [this.robotPose(robot, cast), robot, this.#alive.get(robot) ?? false]);
+    const there = this.#robots.map((robot) => [this.robotPose(robot, cast), robot, this.#stateOf(robot)]);
     const shown = there.filter(([pose]) => pose !== null);
     const taken = shown.map(([pose]) => this.camera.toScreen(pose[0], pose[1])).map(([u, v]) => [u - 9, v - 9, 18, 18]);
     for (const one of shown) draw.drawRobot(context, this.camera, ...one);

@@ -14,7 +14,7 @@ export async function fetchJson(path) {
 
 /** Follow the events; the browser comes again by itself, with the last id it had.
  *
- * @param {object} on  `version`, `team` and `story` take what an event says, `contact` true or
+ * @param {object} on  `version`, `team`, `story` and `poses` take what an event says, `contact` true or
  *                     false: whether the server is heard.
  */
 export function follow(on) {
@@ -25,7 +25,7 @@ export function follow(on) {
   };
   const open = () => {
     const source = new EventSource("/events");
-    for (const kind of ["version", "team", "story"]) {
+    for (const kind of ["version", "team", "story", "poses"]) {
       source.addEventListener(kind, (event) => {
         heard = Date.now();
         tell(true);

@@ -1,0 +1,117 @@
+"""An SQLite file whose every trouble is a `FileError` that names it."""
+
+import sqlite3
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mapweave.errors import FileError
+
+BUSY = 2.0  # [s] for which a reader of the same file is waited for
+
+
+class UnwritableError(FileError):
+    """A store that cannot be written now, and may be later: the disk is full, say."""
+
+
+class DamagedError(FileError):
+    """A store of which a part cannot be read."""
+
+
+class Database:
+    """An SQLite file; usable from several threads, one at a time.
+
+    Parameters
+    ----------
+    path
+        The file; it must be there.
+    read_only
+        Whether nothing will be written, whoever else writes meanwhile.
+
+    Raises
+    ------
+    FileError
+        If it cannot be opened.
+    """
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        self.path = path
+        self._lock = threading.RLock()
+        with self._errors_reported():
+            self._connection = sqlite3.connect(
+                f"{path.resolve().as_uri()}?mode=rw",
+                timeout=BUSY,
+                isolation_level=None,
+                check_same_thread=False,
+                uri=True,
+            )
+        if read_only:
+            self.rows("PRAGMA query_only = ON")
+
+    def close(self) -> None:
+        """Close it; nothing may be asked of it after."""
+        with self._lock, self._errors_reported():
+            self._connection.close()
+
+    def rows(self, sql: str, *values: object) -> list[tuple[Any, ...]]:
+        """Return the rows that a statement gives.
+
+        Raises
+        ------
+        FileError
+            If that is not possible: `UnwritableError` where it may be later.
+        """
+        with self._lock, self._errors_reported():
+            return self._connection.execute(sql, values).fetchall()
+
+    def define(self, name: str, function: Callable[[Any], int]) -> None:
+        """Let statements use `function`, of one argument, by a name."""
+        self._connection.create_function(name, 1, function, deterministic=True)
+
+    @contextmanager
+    def transaction(self, *, durable: bool) -> Iterator[None]:
+        """Do what the block does as a whole, or nothing of it.
+
+        Parameters
+        ----------
+        durable
+            Wait until it is on the disk, with all that was written before: what was told to others
+            is there after a loss of power. Otherwise such a loss costs what was last, no more.
+        """
+        with self._lock:
+            self.rows(f"PRAGMA synchronous = {'FULL' if durable else 'NORMAL'}")
+            self.rows("BEGIN IMMEDIATE")
+            try:
+                yield
+                self.rows("COMMIT")
+            finally:
+                if self._connection.in_transaction:
+                    self.rows("ROLLBACK")
+
+    def copy_to(self, path: Path) -> None:
+        """Write the whole as it is now to the file `path`, while others go on writing."""
+        with self._lock, self._errors_reported():
+            target = sqlite3.connect(path)
+            try:
+                self._connection.backup(target)
+            finally:
+                target.close()
+
+    @contextmanager
+    def _errors_reported(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise self._reported(error) from error
+
+    def _reported(self, error: sqlite3.Error) -> FileError:
+        name = getattr(error, "sqlite_errorname", None) or ""
+        if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
+            return FileError(self.path, "in use by another mapweave server")
+        if name.startswith(("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY")):
+            return UnwritableError(self.path, f"the store cannot be written: {error}")
+        if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB")):
+            return DamagedError(self.path, f"the store is damaged: {error}")
+        return FileError(self.path, f"the store cannot be used: {error}")

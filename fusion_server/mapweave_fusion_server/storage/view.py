@@ -1,0 +1,152 @@
+"""A store that is looked at, by another process than the coordinator, which may go on."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from mapweave.atomic import replace_file
+from mapweave.errors import FileError
+from mapweave_fusion_server.storage.database import DamagedError, Database
+from mapweave_fusion_server.storage.salvage import is_sound
+from mapweave_fusion_server.storage.schema import (
+    MESSAGE_TABLES,
+    SCHEMA_VERSION,
+    checksum,
+    is_missing,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class VersionEntry:
+    """A version: its number, when it was begun [s since 1970], and its bytes."""
+
+    number: int
+    created: float
+    size: int
+
+
+class StoreView:
+    """A store, read only; a context manager.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    FileError
+        If it is not a store, or one of another schema.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if is_missing(path):
+            raise FileError(path, "no store here; expected the file that mapweave server keeps")
+        self._database = Database(path, read_only=True)
+        try:
+            self._check_schema()
+        except FileError:
+            self._database.close()
+            raise
+
+    def __enter__(self) -> "StoreView":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._database.close()
+
+    @property
+    def numbers(self) -> tuple[int, int]:
+        """The first and the last version, 0 and 0 when there is none."""
+        [(first, last)] = self._database.rows("SELECT min(number), max(number) FROM version")
+        return int(first or 0), int(last or 0)
+
+    def versions(self, limit: int) -> list[VersionEntry]:
+        """Return the last `limit` versions, ascending."""
+        rows = self._database.rows(
+            "SELECT number, created, length(message) FROM version ORDER BY number DESC LIMIT ?",
+            limit,
+        )
+        return [VersionEntry(int(n), float(t), int(size)) for n, t, size in reversed(rows)]
+
+    def version(self, number: int) -> bytes:
+        """Return the message of version `number`.
+
+        Raises
+        ------
+        FileError
+            If there is none, or it is damaged.
+        """
+        message = self._message("version", number)
+        if message is None:
+            first, last = self.numbers
+            there = f"there are {first} to {last}" if last else "there is none yet"
+            raise FileError(self.path, f"no version {number} of the joint map; {there}")
+        return message
+
+    def problems(self) -> Iterator[str]:
+        """Yield what is wrong with the file; messages are compared with their checksums."""
+        if not is_sound(self._database):
+            yield "the structure of the file is damaged: the server saves what it can when it opens"
+            return
+        for table in MESSAGE_TABLES:
+            for (row,) in self._database.rows(f"SELECT rowid FROM {table}"):
+                try:
+                    self._message(table, row)
+                except FileError as error:
+                    yield error.problem
+
+    def messages(self, table: str) -> Iterator[tuple[int, bytes]]:
+        """Yield row number and message of all rows of `table` that are whole."""
+        for (row,) in self._database.rows(f"SELECT rowid FROM {table}"):
+            try:
+                message = self._message(table, row)
+            except FileError:
+                continue  # told by `problems`
+            if message is not None:
+                yield row, message
+
+    def backup(self, path: Path) -> None:
+        """Write a copy of the store as it is now to `path`, whole or not at all.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        with replace_file(path) as temporary:
+            self._database.copy_to(temporary)
+            copy = Database(temporary)
+            try:
+                # No file has it, so who opens the copy begins a new series.
+                copy.rows("UPDATE owner SET inode = 0")
+                copy.rows("PRAGMA journal_mode = DELETE")
+            finally:
+                copy.close()
+
+    def _message(self, table: str, row: int) -> bytes | None:
+        try:
+            rows = self._database.rows(
+                f"SELECT message, checksum FROM {table} WHERE rowid = ?", row
+            )
+        except DamagedError as error:
+            raise FileError(self.path, f"row {row} of {table} is damaged") from error
+        if not rows:
+            return None
+        message, expected = rows[0]
+        if not isinstance(message, bytes) or checksum(message) != expected:
+            raise FileError(self.path, f"row {row} of {table} is damaged")
+        return message
+
+    def _check_schema(self) -> None:
+        [(schema,)] = self._database.rows("PRAGMA user_version")
+        if schema != SCHEMA_VERSION:
+            problem = f"a store of schema {schema}, expected {SCHEMA_VERSION}"
+            raise FileError(self.path, f"{problem}: the server brings it up when it opens it")

@@ -1,0 +1,67 @@
+"""A stored joint map as one of the maps to fuse: what it has joined stays joined, and is one piece.
+
+Each of its components goes in as a component of a robot, under the name and in the frame of the
+first that it was made of; the others come along.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.maps import (
+    JointComponent,
+    JointMap,
+    RobotMap,
+    Submap,
+    Trajectory,
+    parse_component,
+)
+
+BOOT = "joint"
+
+
+def as_robot_maps(joint: JointMap) -> list[RobotMap]:
+    """Return the components of `joint` as maps of their first robots."""
+    submaps: dict[str, list[Submap]] = {}
+    for component in joint.components:
+        name = _first(component)
+        robot, number = parse_component(name)
+        of_robot = submaps.setdefault(robot, [])
+        frame = se2.inverse(component.robots[name])
+        of_robot.append(Submap(len(of_robot), number, frame, component.map, Trajectory.empty()))
+    return [RobotMap(robot, BOOT, joint.version, tuple(s)) for robot, s in submaps.items()]
+
+
+def robots_of(joint: JointMap) -> set[str]:
+    """Return the ids of the robots that `joint` was made of."""
+    return {parse_component(name)[0] for component in joint.components for name in component.robots}
+
+
+def with_members(fused: JointMap, stored: Sequence[JointMap]) -> JointMap:
+    """Return `fused` with all that the `stored` joint maps in it were made of.
+
+    Their alignments come first, as they were decided then.
+    """
+    members = {_first(c): c.robots for joint in stored for c in joint.components}
+    components = tuple(
+        replace(c, robots=_with_members(c.robots, members)) for c in fused.components
+    )
+    decided = tuple(alignment for joint in stored for alignment in joint.alignments)
+    return replace(fused, components=components, alignments=(*decided, *fused.alignments))
+
+
+def _with_members(
+    robots: Mapping[str, FloatArray], members: Mapping[str, Mapping[str, FloatArray]]
+) -> dict[str, FloatArray]:
+    """Return where all components are, in the order of their names."""
+    found = dict(robots)
+    for first, pose in robots.items():
+        together = members.get(first, {})
+        for name in together:
+            found[name] = se2.compose(pose, se2.between(together[first], together[name]))
+    return {name: found[name] for name in sorted(found, key=parse_component)}
+
+
+def _first(component: JointComponent) -> str:
+    return min(component.robots, key=parse_component)

@@ -1,0 +1,1 @@
+"""Grids that other programs wrote, one module a format."""
