@@ -13,6 +13,7 @@ from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import Alignment, RobotMap
 from mapweave.scan.scan import Scan
 from mapweave.team.hysteresis import keep_joined
+from mapweave.team.news import is_news
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
@@ -21,7 +22,11 @@ from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
 from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
-from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
+from mapweave_agent.publication_schedule import (
+    AgentParameters,
+    PublicationSchedule,
+    StatusSchedule,
+)
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
@@ -94,7 +99,8 @@ class AgentRun:
         self._past = {run.state: run for run in past}
         self._first = first
         self._tell = tell
-        self._publication = PublicationSchedule(parameters.map_interval)
+        self._publication = PublicationSchedule(parameters)
+        self._statuses = StatusSchedule(parameters)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
         if past:
             self._comparisons.earlier_map(past[-1].map)
@@ -111,7 +117,6 @@ class AgentRun:
         self._scans_seen = 0
         self._changed = False
         self._finished = False
-        self._status_due = 0.0
 
     @property
     def finished(self) -> bool:
@@ -198,16 +203,18 @@ class AgentRun:
             self._tell(pose)
         self._scans_seen += 1
         self._changed |= placement.placed
+        if placement.pose is not None:
+            self._publication.moved(placement.component, placement.pose)
         if placement.submap_finished or placement.lost:
             self._publication.hurry()
         if placement.lost:
             _log.warning("scan %d fits nowhere: a new component begins", scan.index)
 
     def _finish(self) -> None:
-        """Publish the last map, whole, and say that it is the last."""
+        """Publish the last map, and say that it is the last."""
         self._finished = True
         self._mapper.finish()
-        self._publish_map(complete=True)
+        self._publish_map()
         self._publish_status()
         _log.info(
             "finished: %d of %d scans placed, submaps: %d",
@@ -226,12 +233,20 @@ class AgentRun:
             self._reception.take(arrival)
             timeout = 0.0
         now = time.monotonic()
+        if self._reception.met():
+            self._statuses.met(now)
         if self._changed and not self._finished and self._publication.due(now):
-            self._publish_map(complete=False)
+            self._publish_map()
         self._compare(now)
         self._supply(now)
-        if now >= self._status_due:
+        if self._statuses.due(now, self._state_told):
             self._publish_status()
+
+    @property
+    def _state_told(self) -> object:
+        """What others are told at once when it changes."""
+        compared = dict(self._comparisons.published) if self._finished else None
+        return self._finished, len(self._published.components), compared
 
     def _supply(self, now: float) -> None:
         """Send again what others lack, and answer who has asked."""
@@ -251,14 +266,13 @@ class AgentRun:
         if outcome is not None:
             found = self._publish_outcome(outcome)
             self._comparisons.done(outcome.comparison, now, outcome.took, found)
-            self._publish_status()
         if not self._comparer.busy:
             comparison = self._comparisons.begin(now)
             if comparison is not None:
                 self._comparer.start(comparison)
 
     def _publish_outcome(self, outcome: ComparisonOutcome) -> Sequence[Alignment]:
-        """Return what was published: nothing where comparing failed."""
+        """Publish what was found, if it is news; return it, nothing where comparing failed."""
         comparison = outcome.comparison
         if outcome.alignments is None:
             # What was found out about earlier versions of the pair stands.
@@ -273,16 +287,22 @@ class AgentRun:
             MapVersion.of(comparison.other),
             found,
         )
-        self._outbox.send_alignments(message)
+        told = self._outbox.told(message)
+        final = self._comparisons.is_final(comparison)
+        news = told is None or (
+            message.alignments != told.alignments if final else is_news(found, told.unpack())
+        )
+        if news:
+            self._outbox.send_alignments(message)
         return found
 
-    def _publish_map(self, *, complete: bool) -> None:
+    def _publish_map(self) -> None:
         self._changed = False
         with self._mapping:
             snapshot = self._mapper.snapshot()
         mapped = without_strays(snapshot.robot_map())
         self._published = numbered_from(mapped, self._first)
-        arrives = self._outbox.send_map(self._published, complete=complete)
+        arrives = self._outbox.send_map(self._published, complete=False)
         self._tell(self._published)
         self._state.keep(self._published)
         # Peers compare what has arrived: so do we, that it is decided alike on both ends.
@@ -308,7 +328,7 @@ class AgentRun:
             sent=dict(self._outbox.sent),
         )
         self._outbox.send_status(status)
-        self._status_due = time.monotonic() + self._parameters.status_interval
+        self._statuses.sent(time.monotonic(), self._state_told)
 
     @contextmanager
     def _listening(self) -> Iterator[None]:

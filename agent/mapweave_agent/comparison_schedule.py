@@ -138,6 +138,10 @@ class ComparisonSchedule:
         _, other = self._sides(comparison)
         return other.boot in self._peer(comparison.peer).met
 
+    def is_final(self, comparison: Comparison) -> bool:
+        """Tell whether both maps are the last ones of their robots."""
+        return self._own_finished and self._peer(comparison.peer).done_mapping()
+
     def done(
         self, comparison: Comparison, now: float, took: float, found: Sequence[Alignment] = ()
     ) -> None:

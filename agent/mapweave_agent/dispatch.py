@@ -56,6 +56,12 @@ class Dispatcher:
         self._namesakes = Claimants()
         self._namesakes.take(boot, here=True)
         self._assembler = MapAssembler()
+        self._met = False
+
+    def met(self) -> bool:
+        """Tell whether a robot or a coordinator came since this was asked the last time."""
+        met, self._met = self._met, False
+        return met
 
     @property
     def refused(self) -> int:
@@ -66,6 +72,7 @@ class Dispatcher:
     def take(self, arrival: Arrival) -> None:
         """Take in what arrived."""
         presence, coordinator = read_presence(arrival), read_coordinator(arrival)
+        self._met |= (presence is not None or coordinator is not None) and not arrival.gone
         if presence is not None:
             self._take_presence(presence)
         elif coordinator is not None:

@@ -21,6 +21,7 @@ from mapweave_protocol.link.session import (
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, POSE, STATUS
 from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage, StatusMessage, Traffic
+from mapweave_protocol.wire.pairs import states_of
 
 WAITING_QUERIES = 16
 KINDS = "map", "alignment", "pose", "status"
@@ -112,6 +113,16 @@ class Outbox:
             self._alignments[pair] = self._declared.enter_context(publisher)
         self._found[pair] = message
         self._put("alignment", publisher, encode(message))
+
+    def told(self, message: AlignmentMessage) -> AlignmentMessage | None:
+        """Return what was published last of the two runs that `message` is of."""
+        told = self._found.get((message.reference.robot, message.other.robot))
+        ends = message.reference, message.other
+        same = (
+            told is not None
+            and states_of((told.reference, told.other)).keys() == states_of(ends).keys()
+        )
+        return told if same else None
 
     def send_status(self, message: StatusMessage) -> None:
         """Publish how far the robot is."""

@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from mapweave.maps import Alignment, Decision, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason
 from mapweave_agent.comparison_schedule import Comparison, ComparisonSchedule
-from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
+from mapweave_agent.publication_schedule import (
+    AgentParameters,
+    PublicationSchedule,
+    StatusSchedule,
+)
 from mapweave_protocol.wire.messages import AlignmentMessage, Compared, MapVersion
 from mapweave_protocol.wire.pairs import responsible
 
@@ -271,13 +275,52 @@ def work(side: Side, now: float) -> None:
         side.under_way = side.plan.begin(now)
 
 
-def test_a_finished_submap_is_published_at_once_and_growth_at_a_bounded_rate() -> None:
-    plan = PublicationSchedule(interval=2.0)
+def drive(plan: PublicationSchedule, start: float, end: float, component: int = 0) -> None:
+    for x in np.linspace(start, end, 5):
+        plan.moved(component, np.array([x, 0.0, 0.0]))
+
+
+def test_a_finished_submap_is_published_at_once_and_growth_as_far_as_was_driven() -> None:
+    plan = PublicationSchedule(AgentParameters())
     assert plan.due(0.0)
     plan.published(0.0)
-    assert not plan.due(1.9)
+    drive(plan, 0.0, 1.9)
+    assert not plan.due(9.9)
+    assert plan.due(10.0)
+    drive(plan, 1.9, 2.1)
     assert plan.due(2.0)
+    assert not plan.due(1.9)  # however fast it drives
     plan.hurry()
     assert plan.due(0.1)
     plan.published(0.1)
-    assert not plan.due(0.2)
+    assert not plan.due(9.0)
+
+
+def test_a_leap_into_another_component_is_no_way_driven() -> None:
+    plan = PublicationSchedule(AgentParameters())
+    plan.published(0.0)
+    drive(plan, 0.0, 0.5)
+    drive(plan, 100.0, 100.5, component=1)
+    assert not plan.due(5.0)
+
+
+def test_a_status_is_sent_on_a_change_and_now_and_then() -> None:
+    statuses = StatusSchedule(AgentParameters())
+    assert statuses.due(0.0, "mapping")
+    statuses.sent(0.0, "mapping")
+    assert not statuses.due(4.9, "mapping")
+    assert statuses.due(5.0, "mapping")
+    assert not statuses.due(0.9, "finished")
+    assert statuses.due(1.0, "finished")
+
+
+def test_whoever_comes_hears_at_once_and_when_what_was_missing_should_have_come() -> None:
+    statuses = StatusSchedule(AgentParameters())
+    statuses.sent(0.0, "mapping")
+    statuses.met(1.0)
+    assert statuses.due(1.0, "mapping")
+    statuses.sent(1.0, "mapping")
+    assert not statuses.due(3.4, "mapping")
+    assert statuses.due(3.5, "mapping")
+    statuses.sent(3.5, "mapping")
+    assert not statuses.due(8.4, "mapping")

@@ -70,28 +70,25 @@ class Whereabouts:
             robot=self._robot,
             boot=self._boot,
             stamp=scan.stamp if math.isfinite(scan.stamp) else None,
-            sent=now,
+            sent=round(now, 3),
             scan_index=scan.index,
             found=placement.pose is not None,
             component=component,
             pose=to_transform(last.pose),
             covariance=to_covariance(covariance),
-            joint=self._joint(component, last.pose, covariance),
+            joint=self._joint(component, last.pose),
         )
 
-    def _joint(self, component: str, pose: FloatArray, covariance: FloatArray) -> JointPose | None:
+    def _joint(self, component: str, pose: FloatArray) -> JointPose | None:
         with self._frames:
             if self._status is None or component not in self._status.frames:
                 return None
             place = self._status.frames[component]
             frame, since = self._since[component]
-        to_joint = np.eye(3)
-        to_joint[:2, :2] = se2.rotation(place.pose[2])
         return JointPose(
             frame=frame,
             since=since,
             pose=to_transform(se2.compose(place.pose, pose)),
-            covariance=to_covariance(to_joint @ covariance @ to_joint.T),
         )
 
     def _note(self, name: str, status: JointStatusMessage) -> None:
