@@ -11,6 +11,7 @@ import numpy as np
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap, Submap
+from mapweave_protocol.wire.coding.changes import code_changed_free_space, code_changed_lines
 from mapweave_protocol.wire.coding.entropy import Coder, Decoder, Encoder
 from mapweave_protocol.wire.coding.free_space_code import CodedFreeSpace, code_free_space
 from mapweave_protocol.wire.coding.line_code import CodedLines, code_lines, main_turn
@@ -57,6 +58,21 @@ class PackedLines:
         """
         lines = code_lines(coder, packed.lines if packed else None, confident=confident)
         return cls(lines, code_free_space(coder, packed.free if packed else None))
+
+    @classmethod
+    def code_changes(
+        cls, coder: Coder, before: "PackedLines", after: "PackedLines | None"
+    ) -> "PackedLines":
+        """Code what makes `before` `after`, or return what a decoder finds.
+
+        Raises
+        ------
+        ValueError
+            If there is too much of anything.
+        """
+        lines = code_changed_lines(coder, before.lines, after.lines if after else None)
+        free = code_changed_free_space(coder, before.free, after.free if after else None)
+        return cls(lines, free)
 
     def unpack(self, reach: float) -> LineMap:
         """Return the line map.

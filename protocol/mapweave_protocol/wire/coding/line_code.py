@@ -115,7 +115,7 @@ def code_lines(coder: Coder, lines: CodedLines | None, *, confident: bool) -> Co
     """
     turn = coder.count("turn", TURNS - 1, lines.turn if lines else 0)
     polylines = coder.count("polylines", MAX_SEGMENTS, len(lines.counts) if lines else 0)
-    given = _rows(lines) if lines else None
+    given = rows_of(lines) if lines else None
     walk = _Walk(coder, confident=confident)
     counts: list[int] = []
     for number in range(polylines):
@@ -193,7 +193,8 @@ def turned_back(quarter: int, x: int, y: int) -> tuple[int, int]:
     return ((x, y), (y, -x), (-x, -y), (-y, x))[quarter % 4]
 
 
-def _rows(lines: CodedLines) -> Iterator[tuple[int, ...]]:
+def rows_of(lines: CodedLines) -> Iterator[tuple[int, ...]]:
+    """Yield of each segment its ends, support and confidence, 0 where there is none."""
     confidence = np.zeros_like(lines.support) if lines.confidence is None else lines.confidence
     rows = np.column_stack([lines.segments, lines.support, confidence])
     return (tuple(row) for row in rows.tolist())
