@@ -246,7 +246,7 @@ class AgentRun:
     def _state_told(self) -> object:
         """What others are told at once when it changes."""
         compared = dict(self._comparisons.published) if self._finished else None
-        return self._finished, len(self._published.components), compared
+        return self._finished, len(self._published.components), compared, self._reception.lacking
 
     def _supply(self, now: float) -> None:
         """Send again what others lack, and answer who has asked."""
@@ -302,12 +302,12 @@ class AgentRun:
             snapshot = self._mapper.snapshot()
         mapped = without_strays(snapshot.robot_map())
         self._published = numbered_from(mapped, self._first)
-        arrives = self._outbox.send_map(self._published, complete=False)
+        arrives, size = self._outbox.send_map(self._published, complete=False)
         self._tell(self._published)
         self._state.keep(self._published)
         # Peers compare what has arrived: so do we, that it is decided alike on both ends.
         self._comparisons.own_map(arrives, finished=self._finished)
-        self._publication.published(time.monotonic())
+        self._publication.published(time.monotonic(), size)
 
     def _publish_status(self) -> None:
         status = StatusMessage(

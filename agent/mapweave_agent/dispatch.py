@@ -57,6 +57,12 @@ class Dispatcher:
         self._namesakes.take(boot, here=True)
         self._assembler = MapAssembler()
         self._met = False
+        self._lacking: frozenset[str] = frozenset()
+
+    @property
+    def lacking(self) -> frozenset[str]:
+        """Robots of whose maps a newer version is known than is here."""
+        return self._lacking
 
     def met(self) -> bool:
         """Tell whether a robot or a coordinator came since this was asked the last time."""
@@ -113,14 +119,21 @@ class Dispatcher:
             robot_map = self._assembler.update(message)
             if robot_map is not None:
                 self._plan.peer_map(robot_map)
+            self._lacks(message.robot, missing=self._assembler.missing(message.robot))
 
     def _take_status(self, arrival: Arrival) -> None:
         status = self._statuses.read(arrival)
         if status is None or status.robot == self._robot:
             return
         self._needs.peer(status)
+        held = {(state.robot, state.boot): state.version for state in self._plan.held}
+        newest = held.get((status.robot, status.boot), 0)
+        self._lacks(status.robot, missing=status.submaps > 0 and newest < status.map_version)
         if status.state == "finished":
             self._plan.peer_finished(status.robot, status.boot, status.map_version)
+
+    def _lacks(self, robot: str, *, missing: bool) -> None:
+        self._lacking = self._lacking | {robot} if missing else self._lacking - {robot}
 
     def _take_alignment(self, arrival: Arrival) -> None:
         message = self._alignments.read(arrival)

@@ -95,10 +95,17 @@ class Outbox:
         """What was published last of each pair of robots."""
         return self._found.values()
 
-    def send_map(self, robot_map: RobotMap, *, complete: bool) -> RobotMap:
-        """Publish a version of the map, or all of it if `complete`; return it as it arrives."""
-        self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
-        return self._sender.as_sent(robot_map)
+    def send_map(self, robot_map: RobotMap, *, complete: bool) -> tuple[RobotMap, int]:
+        """Publish a version of the map, or all of it if `complete`.
+
+        Returns
+        -------
+        RobotMap, int
+            The map as it arrives, and the size of the message [bytes].
+        """
+        payload = self._sender.payload(robot_map, complete=complete)
+        self._put("map", self._maps, payload)
+        return self._sender.as_sent(robot_map), len(payload)
 
     def send_past(self, run: PastRun) -> None:
         """Publish the map of an earlier run."""

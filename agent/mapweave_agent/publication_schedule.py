@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry.arrays import FloatArray
 from mapweave_protocol.link.lacking import GRACE
 
+MOST_SAVED = 1000.0  # [bytes], and most that is owed: a whole map now and then is no growth
 AGAIN = GRACE + 0.5  # [s] after somebody came: what is still missing then did not arrive by itself
 
 
@@ -31,8 +32,16 @@ class AgentParameters(BaseModel):
     map_patience: float = Field(
         10.0, gt=0, description="[s] after which it is published though less was driven"
     )
+    bytes_per_metre: float = Field(
+        100.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
+    )
+    bytes_per_second: float = Field(
+        5.0,
+        ge=0,
+        description="[1/s] of maps besides: a place may change while it stands",
+    )
     status_interval: float = Field(
-        5.0, gt=0, description="[s] between statuses: an idle robot is to cost 30 B/s at most"
+        10.0, gt=0, description="[s] between statuses: a slow robot drives 2 m meanwhile"
     )
     least_status_interval: float = Field(
         1.0, ge=0, description="[s] after a status before the next, whatever has changed"
@@ -46,13 +55,17 @@ class PublicationSchedule:
         self._parameters = parameters
         self._last: float | None = None
         self._driven = 0.0
+        self._allowed = 0.0  # [bytes] that the way and the time allowed and no message has used
+        self._size = 0  # [bytes] of the last growing submap
         self._at: tuple[int, FloatArray] | None = None
         self._urgent = True
 
     def moved(self, component: int, pose: FloatArray) -> None:
         """Take in where the robot is, ``(3,)`` [m, m, rad] in the frame of `component`."""
         if self._at is not None and self._at[0] == component:
-            self._driven += float(np.hypot(*(pose - self._at[1])[:2]))
+            step = float(np.hypot(*(pose - self._at[1])[:2]))
+            self._driven += step
+            self._allowed += step * self._parameters.bytes_per_metre
         self._at = component, pose
 
     def hurry(self) -> None:
@@ -64,11 +77,17 @@ class PublicationSchedule:
         if self._urgent or self._last is None:
             return True
         p, waited = self._parameters, now - self._last
-        far = self._driven >= p.map_distance and waited >= p.map_interval
-        return far or waited >= max(p.map_patience, p.map_interval)
+        if waited < p.map_interval or self._allowed + waited * p.bytes_per_second < self._size:
+            return False
+        return self._driven >= p.map_distance or waited >= p.map_patience
 
-    def published(self, now: float) -> None:
-        """Note that the map has been published."""
+    def published(self, now: float, size: int = 0) -> None:
+        """Note that the map has been published, in so many bytes."""
+        waited = 0.0 if self._last is None else now - self._last
+        allowed = self._allowed + waited * self._parameters.bytes_per_second - size
+        self._allowed = min(max(allowed, -MOST_SAVED), MOST_SAVED)
+        if not self._urgent:
+            self._size = size
         self._last = now
         self._driven = 0.0
         self._urgent = False

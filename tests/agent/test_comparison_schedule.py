@@ -296,6 +296,22 @@ def test_a_finished_submap_is_published_at_once_and_growth_as_far_as_was_driven(
     assert not plan.due(9.0)
 
 
+def test_growth_waits_until_the_way_has_paid_for_it() -> None:
+    p = AgentParameters()
+    plan = PublicationSchedule(p)
+    plan.published(0.0)
+    drive(plan, 0.0, 2.0)
+    assert plan.due(2.0)
+    plan.published(2.0, size=500)
+    drive(plan, 2.0, 4.5)
+    assert not plan.due(4.0)
+    plan.hurry()  # what has settled does not wait
+    assert plan.due(4.0)
+    plan.published(4.0, size=100)
+    drive(plan, 4.5, 12.0)
+    assert plan.due(6.0)
+
+
 def test_a_leap_into_another_component_is_no_way_driven() -> None:
     plan = PublicationSchedule(AgentParameters())
     plan.published(0.0)
@@ -308,8 +324,8 @@ def test_a_status_is_sent_on_a_change_and_now_and_then() -> None:
     statuses = StatusSchedule(AgentParameters())
     assert statuses.due(0.0, "mapping")
     statuses.sent(0.0, "mapping")
-    assert not statuses.due(4.9, "mapping")
-    assert statuses.due(5.0, "mapping")
+    assert not statuses.due(9.9, "mapping")
+    assert statuses.due(10.0, "mapping")
     assert not statuses.due(0.9, "finished")
     assert statuses.due(1.0, "finished")
 
@@ -323,4 +339,4 @@ def test_whoever_comes_hears_at_once_and_when_what_was_missing_should_have_come(
     assert not statuses.due(3.4, "mapping")
     assert statuses.due(3.5, "mapping")
     statuses.sent(3.5, "mapping")
-    assert not statuses.due(8.4, "mapping")
+    assert not statuses.due(13.4, "mapping")

@@ -31,6 +31,12 @@ def key_scan_bytes(member: Member, robot_map: RobotMap) -> int:
     )
 
 
+def path_length(robot_map: RobotMap) -> float:
+    """Return how far a robot drove by its own map [m]."""
+    paths = (component_path(robot_map, component)[1] for component in robot_map.components)
+    return float(sum(np.hypot(*np.diff(path[:, :2], axis=0).T).sum() for path in paths))
+
+
 def chosen(index: IntArray, poses: FloatArray) -> Iterator[int]:
     """Yield which of the scans `index` (m,), taken at `poses` (m, 3) [m, m, rad], are key scans."""
     last = None

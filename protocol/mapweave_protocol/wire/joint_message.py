@@ -212,12 +212,13 @@ class JointMapMessage(Message):
             tuple(alignment.unpack() for alignment in self.alignments),
         )
 
+    def follows(self, before: Self) -> bool:
+        """Tell whether `before` is the version before this one, complete."""
+        version = before.series, before.version + 1, before.changes
+        return version == (self.series, self.version, False)
+
     def _check_follows(self, before: Self) -> None:
-        if (before.series, before.version, before.changes) != (
-            self.series,
-            self.version - 1,
-            False,
-        ):
+        if not self.follows(before):
             raise ValueError(f"expected version {self.version - 1} of {self.series} before it")
 
 
