@@ -8,6 +8,11 @@ ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,31}$"
 _ID = re.compile(ID_PATTERN + r"(?!\n)")
 
 
+def is_id(name: str) -> bool:
+    """Tell whether `name` is a valid id."""
+    return _ID.fullmatch(name) is not None
+
+
 def check_id(kind: str, name: str) -> str:
     """Return `name` if it is a valid id, such as a robot's.
 

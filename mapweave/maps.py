@@ -16,6 +16,8 @@ from mapweave.errors import InvalidComponentError
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.marks import Mark, PlacedMark
+from mapweave.orders import Order
 from mapweave.reasons import Reason, Status
 from mapweave.text import tell_reason
 
@@ -177,6 +179,8 @@ class RobotMap:
         Ids ascending.
     made_with
         The program and its configuration; None where it is not known, as in maps from the network.
+    marks
+        What was marked on it.
     """
 
     robot: str
@@ -184,6 +188,7 @@ class RobotMap:
     version: int
     submaps: tuple[Submap, ...]
     made_with: MadeWith | None = None
+    marks: tuple[Mark, ...] = ()
 
     @property
     def components(self) -> list[int]:
@@ -249,25 +254,30 @@ class JointComponent:
         The merged lines and the free space.
     segment_confidence
         (n,) for each segment of `map`, in [0, 1].
+    marks
+        Of its robots, in its frame.
     """
 
     robots: Mapping[str, FloatArray]
     confidence: float
     map: LineMap
     segment_confidence: FloatArray
+    marks: tuple[PlacedMark, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointMap:
     """What the team knows, as a numbered immutable version.
 
-    `made_with` is None where it is not known, as in maps from the network.
+    `made_with` is None where it is not known, as in maps from the network; `orders` are those of
+    operators that were not taken back.
     """
 
     version: int
     components: tuple[JointComponent, ...]
     alignments: tuple[Alignment, ...]
     made_with: MadeWith | None = None
+    orders: tuple[Order, ...] = ()
 
 
 def component_name(robot: str, component: int) -> str:

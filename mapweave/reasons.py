@@ -37,6 +37,10 @@ class ReasonKind(StrEnum):
     MAPS_CONTRADICT_JOINTLY = "maps_contradict_jointly"  # it, or another one on the way
     UNDECIDED = "undecided"
 
+    PINNED = "pinned"  # an operator says that it is right
+    FORBIDDEN = "forbidden"  # an operator says that it is wrong
+    FORBIDDEN_BETWEEN = "forbidden_between"  # it would join others of which one says so
+
     WORDS = "words"  # a sentence, of a program that gave no more
 
 
@@ -68,6 +72,15 @@ _ABOUT_FOUND = {
     ReasonKind.MAPS_CONTRADICT,
     ReasonKind.MAPS_CONTRADICT_JOINTLY,
     ReasonKind.UNDECIDED,
+    ReasonKind.FORBIDDEN,
+    ReasonKind.FORBIDDEN_BETWEEN,
+}
+_MAY_BE_ABOUT_FOUND = {ReasonKind.PINNED}
+_OF_WORDS = {
+    ReasonKind.WORDS,
+    ReasonKind.PINNED,
+    ReasonKind.FORBIDDEN,
+    ReasonKind.FORBIDDEN_BETWEEN,
 }
 
 
@@ -86,7 +99,7 @@ class Reason:
     found
         What was found before, where this says more about it.
     text
-        The sentence, of words alone.
+        The sentence, of words alone; of what was ordered, who ordered it and why.
 
     Raises
     ------
@@ -104,10 +117,11 @@ class Reason:
         if set(self.numbers) not in (needed, needed | self._optional()):
             wanted = ", ".join(sorted(needed)) or "no numbers"
             raise ValueError(f"reason {self.kind}: expected {wanted}, found {sorted(self.numbers)}")
-        if (self.found is not None) != (self.kind in _ABOUT_FOUND):
-            how = "with" if self.kind in _ABOUT_FOUND else "without"
+        about = self.kind in _ABOUT_FOUND
+        if (self.found is not None) != about and self.kind not in _MAY_BE_ABOUT_FOUND:
+            how = "with" if about else "without"
             raise ValueError(f"reason {self.kind}: expected {how} what was found before")
-        if self.text and self.kind is not ReasonKind.WORDS:
+        if self.text and self.kind not in _OF_WORDS:
             raise ValueError(f"reason {self.kind}: expected no words")
         if self._depth() > MAX_DEPTH:
             raise ValueError(f"reason {self.kind}: expected at most {MAX_DEPTH} in a row")

@@ -38,6 +38,9 @@ _SENTENCES = {
     " the other saw free space, {common:.0f} m in common, by this alignment or another one between"
     " them; {found}",
     ReasonKind.UNDECIDED: "contradicts others, and nothing tells for sure which is wrong; {found}",
+    ReasonKind.PINNED: "pinned by {text}{also}",
+    ReasonKind.FORBIDDEN: "forbidden by {text}; {found}",
+    ReasonKind.FORBIDDEN_BETWEEN: "would join {witnesses}, forbidden by {text}; {found}",
     ReasonKind.WORDS: "{text}",
 }
 _MATCH = "{:.0f} m of wall in common, {:.1f} m contradicted"
@@ -79,7 +82,7 @@ def _words(cause: Reason, ends: Pair, by: Sequence[Pair]) -> dict[str, float | s
     numbers = cause.numbers
     words: dict[str, float | str] = {"reference": ends[0], "other": ends[1], "text": cause.text}
     words |= {"others": _tell_others(by), "witnesses": _tell_witnesses(by)}
-    words["next_best"] = "nothing else fits"
+    words |= {"next_best": "nothing else fits", "also": ""}
     if "contradicted" in numbers:
         words["match"] = _MATCH.format(numbers["common"], numbers["contradicted"])
     if "confidence" in numbers:
@@ -97,6 +100,7 @@ def _words(cause: Reason, ends: Pair, by: Sequence[Pair]) -> dict[str, float | s
         }
     if cause.found is not None:
         words["found"] = tell_cause(cause.found, ends, None)
+        words["also"] = f"; {words['found']}"
     return {**numbers, **words}
 
 

@@ -34,7 +34,11 @@ ABOUT_FOUND: dict[ReasonKind, list[str]] = {
     ReasonKind.MAPS_CONTRADICT: MATCH,
     ReasonKind.MAPS_CONTRADICT_JOINTLY: MATCH,
     ReasonKind.UNDECIDED: [],
+    ReasonKind.PINNED: [],
+    ReasonKind.FORBIDDEN: [],
+    ReasonKind.FORBIDDEN_BETWEEN: [],
 }
+ORDERED = {ReasonKind.PINNED, ReasonKind.FORBIDDEN, ReasonKind.FORBIDDEN_BETWEEN}
 PRINTABLE = st.text("aé° {}%;…", max_size=40)
 
 
@@ -48,7 +52,8 @@ def reasons(draw: st.DrawFn) -> Reason:
         names = draw(st.sampled_from(NEEDED[kind]))
         reason = Reason(kind, {name: draw(NUMBERS) for name in names})
     for above in draw(st.lists(st.sampled_from(list(ABOUT_FOUND)), max_size=MAX_DEPTH - 1)):
-        reason = Reason(above, {name: draw(NUMBERS) for name in ABOUT_FOUND[above]}, reason)
+        words = draw(PRINTABLE) if above in ORDERED else ""
+        reason = Reason(above, {name: draw(NUMBERS) for name in ABOUT_FOUND[above]}, reason, words)
     return reason
 
 

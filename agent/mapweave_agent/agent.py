@@ -9,37 +9,27 @@ from contextlib import contextmanager
 
 import zenoh
 
+from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import Alignment, RobotMap
 from mapweave.scan.scan import Scan
 from mapweave.team.hysteresis import keep_joined
-from mapweave.team.news import is_news
+from mapweave_agent.by_hand.kept_orders import KeptOrders
+from mapweave_agent.by_hand.own_marks import Frame, OwnMarks
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
+from mapweave_agent.listening import listening
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
 from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
-from mapweave_agent.publication_schedule import (
-    AgentParameters,
-    PublicationSchedule,
-    StatusSchedule,
-)
+from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule, StatusSchedule
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
-from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.link.asking import request_orders_of_coordinator
 from mapweave_protocol.link.inbox import Inbox
-from mapweave_protocol.link.session import declare_subscriber
-from mapweave_protocol.wire.keys import (
-    ALIGNMENT,
-    COORDINATOR_LIVE,
-    JOINT_STATUS,
-    LIVE,
-    MAP,
-    STATUS,
-)
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
@@ -106,8 +96,15 @@ class AgentRun:
             self._comparisons.earlier_map(past[-1].map)
         self._needs = Needs(mapper.robot)
         self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
+        self._marks = OwnMarks(mapper.robot, mapper.boot)
+        self._orders = KeptOrders(state)
         self._reception = Dispatcher(
-            mapper.robot, mapper.boot, self._comparisons, self._needs, self._whereabouts
+            mapper.robot,
+            mapper.boot,
+            self._comparisons,
+            self._needs,
+            self._whereabouts,
+            self._orders,
         )
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot, state.sender)
         self._inbox = Inbox()
@@ -122,6 +119,16 @@ class AgentRun:
     def finished(self) -> bool:
         """Whether all scans are mapped, and the last map is published."""
         return self._finished
+
+    def mark(self, label: str, place: FloatArray, frame: Frame) -> str:
+        """Mark a (2,) `place` [m] from any thread; as of `OwnMarks.add`."""
+        with self._mapping:
+            snapshot = self._mapper.snapshot()
+        return self._marks.add(snapshot.submaps, label, place, frame, time.time())
+
+    def take_back_mark(self, identity: str) -> None:
+        """Take a mark back; as of `OwnMarks.remove`."""
+        self._marks.remove(identity)
 
     def run(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         """Map all `scans` of a recording, then compare with the peers until `stopping`.
@@ -171,7 +178,8 @@ class AgentRun:
 
     @contextmanager
     def _in_the_team(self) -> Iterator[None]:
-        with self._outbox, self._listening():
+        robot, put = self._mapper.robot, self._inbox.put
+        with self._outbox, listening(self._session, self._team, robot, put):
             _log.info("%s joins team %s", self._mapper.robot, self._team)
             yield
             if self._reception.refused:
@@ -235,6 +243,8 @@ class AgentRun:
         now = time.monotonic()
         if self._reception.met():
             self._statuses.met(now)
+        if self._marks.is_news:
+            self._publish_marks()
         if self._changed and not self._finished and self._publication.due(now):
             self._publish_map()
         self._compare(now)
@@ -251,14 +261,20 @@ class AgentRun:
     def _supply(self, now: float) -> None:
         """Send again what others lack, and answer who has asked."""
         own = MapVersion.of(self._published) if self._published.submaps else None
-        missing = self._needs.missing(own, self._outbox.found, now, self._past)
+        marked = {run.marks_state: run.marks for run in self._past.values()}
+        marks = [s for s in (self._marks.state, *marked) if s is not None]
+        missing = self._needs.missing(own, self._outbox.found, now, self._past, marks)
         if missing.map:
             self._outbox.send_map(self._published, complete=True)
         for run in missing.past:
             self._outbox.send_past(self._past[run])
         for message in missing.alignments:
             self._outbox.send_alignments(message)
-        self._outbox.answer(self._published)
+        for run in missing.marks:
+            self._outbox.send_marks(marked.get(run) or self._marks.message())
+        if self._orders.lacks(now):
+            request_orders_of_coordinator(self._session, self._team, self._inbox.put)
+        self._outbox.answer(self._published, self._orders.message)
 
     def _compare(self, now: float) -> None:
         """Publish the outcome of the comparison under way, if there is one; begin the next."""
@@ -287,27 +303,24 @@ class AgentRun:
             MapVersion.of(comparison.other),
             found,
         )
-        told = self._outbox.told(message)
-        final = self._comparisons.is_final(comparison)
-        news = told is None or (
-            message.alignments != told.alignments if final else is_news(found, told.unpack())
-        )
-        if news:
-            self._outbox.send_alignments(message)
+        self._outbox.send_news(message, final=self._comparisons.is_final(comparison))
         return found
 
     def _publish_map(self) -> None:
         self._changed = False
         with self._mapping:
             snapshot = self._mapper.snapshot()
-        mapped = without_strays(snapshot.robot_map())
-        self._published = numbered_from(mapped, self._first)
+        self._published = numbered_from(without_strays(snapshot.robot_map()), self._first)
         arrives, size = self._outbox.send_map(self._published, complete=False)
         self._tell(self._published)
         self._state.keep(self._published)
-        # Peers compare what has arrived: so do we, that it is decided alike on both ends.
         self._comparisons.own_map(arrives, finished=self._finished)
         self._publication.published(time.monotonic(), size)
+
+    def _publish_marks(self) -> None:
+        message = self._marks.message()
+        self._outbox.send_marks(message)
+        self._state.keep_marks(message)
 
     def _publish_status(self) -> None:
         status = StatusMessage(
@@ -326,28 +339,10 @@ class AgentRun:
             compared=dict(self._comparisons.published),
             holds=self._comparisons.held,
             sent=dict(self._outbox.sent),
+            orders=self._orders.digest,
         )
         self._outbox.send_status(status)
         self._statuses.sent(time.monotonic(), self._state_told)
-
-    @contextmanager
-    def _listening(self) -> Iterator[None]:
-        """Subscribe to the peers' presence, then to what they say."""
-        robot, put = self._mapper.robot, self._inbox.put
-        live, maps = LIVE.pattern(team=self._team), MAP.pattern(team=self._team)
-        coordinators = COORDINATOR_LIVE.pattern(team=self._team)
-        as_reference = ALIGNMENT.pattern(team=self._team, reference=robot)
-        as_other = ALIGNMENT.pattern(team=self._team, other=robot)
-        with (
-            self._session.liveliness().declare_subscriber(live, put, history=True),
-            self._session.liveliness().declare_subscriber(coordinators, put, history=True),
-            declare_subscriber(self._session, as_reference, put),
-            declare_subscriber(self._session, as_other, put),
-            declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
-            self._session.declare_subscriber(STATUS.pattern(team=self._team), put),
-            self._session.declare_subscriber(JOINT_STATUS.build(team=self._team), put),
-        ):
-            yield
 
 
 def _scans_placed(robot_map: RobotMap) -> int:

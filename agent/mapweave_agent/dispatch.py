@@ -2,6 +2,7 @@
 
 import logging
 
+from mapweave_agent.by_hand.kept_orders import KeptOrders
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -34,6 +35,8 @@ class Dispatcher:
         Told what others hold.
     whereabouts
         Told which frames the joint map has.
+    orders
+        Told what operators order.
     """
 
     def __init__(
@@ -43,11 +46,13 @@ class Dispatcher:
         plan: ComparisonSchedule,
         needs: Needs,
         whereabouts: Whereabouts,
+        orders: KeptOrders,
     ) -> None:
         self._robot = robot
         self._plan = plan
         self._needs = needs
         self._whereabouts = whereabouts
+        self._orders = orders
         self._maps = map_reader()
         self._statuses = status_reader()
         self._alignments = alignment_reader()
@@ -73,7 +78,7 @@ class Dispatcher:
     def refused(self) -> int:
         """How many messages were not what they should be."""
         readers = self._maps, self._statuses, self._alignments, self._joint_statuses
-        return sum(reader.refused for reader in readers)
+        return sum(reader.refused for reader in readers) + self._orders.refused
 
     def take(self, arrival: Arrival) -> None:
         """Take in what arrived."""
@@ -91,6 +96,8 @@ class Dispatcher:
             self._take_alignment(arrival)
         elif self._joint_statuses.reads(arrival):
             self._take_joint_status(arrival)
+        else:
+            self._orders.takes(arrival)
 
     def _take_presence(self, presence: Presence) -> None:
         if presence.robot == self._robot:
@@ -112,6 +119,7 @@ class Dispatcher:
         if status is not None:
             self._needs.coordinator(status)
             self._whereabouts.coordinator(status)
+            self._orders.coordinator(status)
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)

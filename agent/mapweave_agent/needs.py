@@ -18,11 +18,12 @@ from mapweave_protocol.wire.pairs import is_older, states_of
 
 @dataclass(frozen=True, slots=True)
 class Missing:
-    """What is to be sent again: the whole map, those of past runs, and alignments."""
+    """What is to be sent again: the whole map, those of past runs, alignments, marks of runs."""
 
     map: bool = False
     past: tuple[MapVersion, ...] = ()
     alignments: tuple[AlignmentMessage, ...] = ()
+    marks: tuple[MapVersion, ...] = ()
 
 
 class Needs:
@@ -54,6 +55,7 @@ class Needs:
         found: Iterable[AlignmentMessage],
         now: float,
         past: Iterable[MapVersion] = (),
+        marks: Sequence[MapVersion] = (),
     ) -> Missing:
         """Return what those lack who have spoken since the last time.
 
@@ -67,6 +69,8 @@ class Needs:
             [s] by any clock.
         past
             The maps of this robot's earlier runs, which coordinators should hold.
+        marks
+            The marks of this robot's runs, as published, likewise.
         """
         coordinators = {f"coordinator {b}": s.maps for b, s in self._coordinators.items()}
         held = coordinators | {f"{s.robot} {b}": s.holds for b, s in self._peers.items()}
@@ -79,9 +83,16 @@ class Needs:
             for who, m in coordinators.items()
             if self._lacks_map(f"{who} {run.boot}", m, run, now)
         ]
+        unmarked = [
+            run
+            for run in marks
+            for boot, status in self._coordinators.items()
+            if self._lacks_map(f"marks {boot} {run.boot}", status.marks, run, now)
+        ]
         self._coordinators.clear()
         self._peers.clear()
-        return Missing(any(lacks), tuple(dict.fromkeys(wanted)), missing)
+        runs, marked = (tuple(dict.fromkeys(those)) for those in (wanted, unmarked))
+        return Missing(any(lacks), runs, missing, marked)
 
     def _lacks_map(self, who: str, held: Sequence[MapVersion], own: MapVersion, now: float) -> bool:
         mine = [version for version in held if version.robot == self._robot]

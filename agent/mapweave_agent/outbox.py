@@ -10,21 +10,32 @@ import zenoh
 import zenoh.ext as ze
 
 from mapweave.maps import RobotMap
+from mapweave.team.news import is_news
 from mapweave_agent.past_runs import PastRun
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import (
     declare_alignment_publisher,
     declare_map_publisher,
+    declare_marks_publisher,
     declare_pose_publisher,
     declare_status_publisher,
 )
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, POSE, STATUS
-from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage, StatusMessage, Traffic
-from mapweave_protocol.wire.pairs import states_of
+from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, MARK, POSE, STATUS
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    MarksMessage,
+    OrdersMessage,
+    PoseMessage,
+    StatusMessage,
+    Traffic,
+)
+from mapweave_protocol.wire.pairs import Run, states_of
+from mapweave_protocol.wire.queries import JointQuery
 
 WAITING_QUERIES = 16
-KINDS = "map", "alignment", "pose", "status"
+KINDS = "map", "alignment", "pose", "mark", "status"
+ORDERS = JointQuery(orders="all").parameters
 
 _log = logging.getLogger(__name__)
 
@@ -50,6 +61,7 @@ class Outbox:
         self._sender = sender
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[tuple[str, str], AlignmentMessage] = {}
+        self._marked: dict[str, MarksMessage] = {}
         self._messages = Counter(dict.fromkeys(KINDS, 0))
         self._bytes = Counter(dict.fromkeys(KINDS, 0))
         self._declared = ExitStack()
@@ -62,6 +74,8 @@ class Outbox:
             status_key = STATUS.build(team=self._team, robot=self._robot)
             live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
             self._maps = keep(declare_map_publisher(self._session, map_key))
+            marks_key = MARK.build(team=self._team, robot=self._robot)
+            self._marks = keep(declare_marks_publisher(self._session, marks_key))
             pose_key = POSE.build(team=self._team, robot=self._robot)
             self._poses = keep(declare_pose_publisher(self._session, pose_key))
             self._statuses = keep(declare_status_publisher(self._session, status_key))
@@ -111,6 +125,11 @@ class Outbox:
         """Publish the map of an earlier run."""
         self._put("map", self._maps, run.payload)
 
+    def send_marks(self, message: MarksMessage) -> None:
+        """Publish the marks of a run of the robot, all of them."""
+        self._marked[message.boot] = message
+        self._put("mark", self._marks, encode(message))
+
     def send_alignments(self, message: AlignmentMessage) -> None:
         """Publish what was found out about a pair of robots."""
         pair = message.reference.robot, message.other.robot
@@ -121,15 +140,20 @@ class Outbox:
         self._found[pair] = message
         self._put("alignment", publisher, encode(message))
 
-    def told(self, message: AlignmentMessage) -> AlignmentMessage | None:
-        """Return what was published last of the two runs that `message` is of."""
+    def send_news(self, message: AlignmentMessage, *, final: bool) -> None:
+        """Publish what was found about a pair of robots where it differs from what was told.
+
+        Parameters
+        ----------
+        final
+            Whether it is the last: then any difference counts.
+        """
         told = self._found.get((message.reference.robot, message.other.robot))
-        ends = message.reference, message.other
-        same = (
-            told is not None
-            and states_of((told.reference, told.other)).keys() == states_of(ends).keys()
-        )
-        return told if same else None
+        if told is not None and _runs(told) == _runs(message):
+            same = told.alignments == message.alignments
+            if same or not (final or is_news(message.unpack(), told.unpack())):
+                return
+        self.send_alignments(message)
 
     def send_status(self, message: StatusMessage) -> None:
         """Publish how far the robot is."""
@@ -139,18 +163,26 @@ class Outbox:
         """Publish where the robot is."""
         self._put("pose", self._poses, encode(message))
 
-    def answer(self, robot_map: RobotMap) -> None:
-        """Give who has asked the whole of `robot_map`, as published last, and what was found."""
+    def answer(self, robot_map: RobotMap, orders: OrdersMessage) -> None:
+        """Give who has asked the whole of `robot_map`, as published last, and what was found.
+
+        Or, who has asked for that, the `orders` of operators.
+        """
         while (query := self._asked.handler.try_recv()) is not None:
             with query:
-                self._answer(query, robot_map)
+                self._answer(query, robot_map, orders)
 
-    def _answer(self, query: zenoh.Query, robot_map: RobotMap) -> None:
+    def _answer(self, query: zenoh.Query, robot_map: RobotMap, orders: OrdersMessage) -> None:
+        parts = {"team": self._team, "robot": self._robot}
         try:
-            map_key = MAP.build(team=self._team, robot=self._robot)
-            query.reply(map_key, self._sender.whole(robot_map))
+            if str(query.parameters) == ORDERS:
+                query.reply(AGENT_QUERY.build(**parts), encode(orders))
+                return
+            query.reply(MAP.build(**parts), self._sender.whole(robot_map))
             for message in self._found.values():
                 query.reply(self._key_of(message), encode(message))
+            for marks in self._marked.values():
+                query.reply(MARK.build(**parts), encode(marks))
         except zenoh.ZError as error:
             _log.warning("an answer could not be sent: %s", error)
 
@@ -164,3 +196,7 @@ class Outbox:
         publisher.put(payload)
         self._messages[kind] += 1
         self._bytes[kind] += len(payload)
+
+
+def _runs(message: AlignmentMessage) -> set[Run]:
+    return set(states_of((message.reference, message.other)))

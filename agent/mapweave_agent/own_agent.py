@@ -20,6 +20,7 @@ from mapweave.mapping.localization.known_map import KnownMap
 from mapweave.maps import JointMap, RobotMap
 from mapweave.scan.scan import Scan
 from mapweave_agent.agent import AgentRun
+from mapweave_agent.by_hand.own_marks import Frame, checked
 from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.publication_schedule import AgentParameters
@@ -154,6 +155,41 @@ class Agent:
         self._fed += 1
         self._scans.put(scan)
 
+    def mark(self, label: str, x: float, y: float, *, frame: Frame = "map") -> str:
+        """Mark a place, such as a victim, on the robot's map; return the mark's id.
+
+        The mark moves with every correction of the map, and is in the team's joint map.
+
+        Parameters
+        ----------
+        label
+            What is there; 1 to 64 printable characters.
+        x, y
+            Where [m].
+        frame
+            Of what: ``map``, the robot's own map as of `PoseMessage.pose`, or ``sensor``, the
+            sensor at the last scan that is mapped: x ahead, y to the left.
+
+        Raises
+        ------
+        ArgumentError
+            If one of these cannot be used, or nothing is mapped yet.
+        MapweaveError
+            If the agent has failed.
+        """
+        self._check_running()
+        return self._run.mark(label, checked(label, x, y, frame), frame)
+
+    def take_back_mark(self, mark: str) -> None:
+        """Take a mark of this agent back, by its id.
+
+        Raises
+        ------
+        ArgumentError
+            If there is none.
+        """
+        self._run.take_back_mark(mark)
+
     def __enter__(self) -> Self:
         """Join the team; returns once the router has answered.
 
@@ -163,9 +199,9 @@ class Agent:
             If it has not for `patience`.
         """
         with ExitStack() as stack:
-            run = self._open(stack)
+            self._run = self._open(stack)
             self._opened = stack.pop_all()
-        self._threads = [threading.Thread(target=self._map, args=(run,), name=self._robot)]
+        self._threads = [threading.Thread(target=self._map, args=(self._run,), name=self._robot)]
         for listen in self._listeners():
             self._threads.append(threading.Thread(target=listen))
         for thread in self._threads:

@@ -1,6 +1,7 @@
 """A robot's runs on disk, one file each: what a restarted agent numbers on from, and delivers.
 
-A file holds the whole map of a run, as the message that travels.
+A file holds the whole map of a run, as the message that travels. Beside it lie the marks that the
+run made, and the orders of operators that were heard of.
 """
 
 import logging
@@ -8,16 +9,28 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError
 from mapweave.maps import RobotMap
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler, MapSender
-from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.messages import MapMessage, MapVersion
+from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.messages import (
+    MapMessage,
+    MapVersion,
+    MarksMessage,
+    OrderMessage,
+    OrdersMessage,
+)
+from mapweave_protocol.wire.model import Message
 
 SUFFIX = ".map"
+MARKS_SUFFIX = ".marks"
+ORDERS_FILE = "orders"
+
+M = TypeVar("M", bound=Message)
 
 _log = logging.getLogger(__name__)
 
@@ -34,16 +47,27 @@ class PastRun:
         The same, as its message.
     age
         How long ago it was written [s].
+    marks
+        The message of the marks that it made; None where it made none.
     """
 
     map: RobotMap
     payload: bytes
     age: float
+    marks: MarksMessage | None = None
 
     @property
     def state(self) -> MapVersion:
         """Which state of the map it is."""
         return MapVersion.of(self.map)
+
+    @property
+    def marks_state(self) -> MapVersion | None:
+        """Which version of its marks they are; None where it made none."""
+        if self.marks is None:
+            return None
+        robot, boot, version = self.marks.robot, self.marks.boot, self.marks.version
+        return MapVersion(robot=robot, boot=boot, version=version)
 
 
 class StateFolder:
@@ -77,8 +101,46 @@ class StateFolder:
             If it cannot be written.
         """
         payload = self.sender.whole(robot_map)
-        with replace_file(self.path / f"{robot_map.boot}{SUFFIX}") as new:
+        self._write(f"{robot_map.boot}{SUFFIX}", payload)
+
+    def keep_marks(self, message: MarksMessage) -> None:
+        """Keep the marks of a run in place of those kept before.
+
+        Raises
+        ------
+        FileError
+            If they cannot be written.
+        """
+        self._write(f"{message.boot}{MARKS_SUFFIX}", encode(message))
+
+    def keep_orders(self, message: OrdersMessage) -> None:
+        """Keep the orders of operators, all there are.
+
+        Raises
+        ------
+        FileError
+            If they cannot be written.
+        """
+        self._write(ORDERS_FILE, encode(message))
+
+    def orders(self) -> tuple[OrderMessage, ...]:
+        """Return the orders that are kept."""
+        message = self._message(self.path / ORDERS_FILE, OrdersMessage)
+        return () if message is None else message.orders
+
+    def _write(self, name: str, payload: bytes) -> None:
+        with replace_file(self.path / name) as new:
             new.write_bytes(payload)
+
+    def _message(self, path: Path, kind: type[M]) -> M | None:
+        """Return what is in a file, None if it is not there; what is no message is told."""
+        if not path.exists():
+            return None
+        try:
+            return decode(kind, path.read_bytes())
+        except MessageError as error:
+            _log.warning("%s: passed over, %s", path, error)
+            return None
 
     def runs(self, robot: str, now: float) -> list[PastRun]:
         """Return the runs of `robot`, the earliest first; `now` [s since 1970].
@@ -90,17 +152,16 @@ class StateFolder:
         return sorted(runs, key=lambda run: max(run.map.components))
 
     def _read(self, path: Path, robot: str, now: float) -> PastRun | None:
-        payload = path.read_bytes()
-        try:
-            message = decode(MapMessage, payload)
-        except MessageError as error:
-            _log.warning("%s: passed over, %s", path, error)
+        message = self._message(path, MapMessage)
+        if message is None:
             return None
         robot_map = MapAssembler().update(message)
         if robot_map is None or robot_map.robot != robot:
             _log.warning("%s: passed over, no whole map of %s", path, robot)
             return None
-        return PastRun(robot_map, payload, now - path.stat().st_mtime)
+        marks = self._message(path.with_suffix(MARKS_SUFFIX), MarksMessage)
+        age = now - path.stat().st_mtime
+        return PastRun(robot_map, path.read_bytes(), age, marks)
 
 
 def default_folder(team: str, robot: str, environment: Mapping[str, str] = os.environ) -> Path:

@@ -12,10 +12,18 @@ from typing import TypeAlias
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.maps import Alignment, JointMap, RobotMap, component_name, parse_component
+from mapweave.orders import Order
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.rebase import Change, SubmapPlace, carry, places_of
 from mapweave.team.revocation import mark_revoked
-from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
+from mapweave_fusion_server.said import Said
+from mapweave_protocol.link.order_ledger import OrderLedger
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    MapVersion,
+    MarksMessage,
+    OrderMessage,
+)
 from mapweave_protocol.wire.pairs import Run, is_older, states_of
 
 MAX_RUNS = 64  # of a robot: a new battery every hour for a week of days
@@ -59,12 +67,15 @@ class Draft:
         All that are known.
     before
         The alignments of the last version, as it judged them.
+    orders
+        Of operators, marks apart: those are on the maps.
     """
 
     version: int
     maps: tuple[RobotMap, ...]
     alignments: tuple[Alignment, ...]
     before: tuple[Alignment, ...] = ()
+    orders: tuple[Order, ...] = ()
 
     def build(self, builder: JointMapBuilder) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
@@ -74,7 +85,7 @@ class Draft:
         builder
             Keeps what it made for the versions before.
         """
-        joint = builder.build(self.maps, self.alignments, self.version)
+        joint = builder.build(self.maps, self.alignments, self.version, self.orders)
         return mark_revoked(joint, self.before)
 
 
@@ -107,6 +118,7 @@ class Coordinator:
         self._states: dict[Run, dict[int, dict[int, SubmapPlace]]] = {}
         self._alignments: dict[frozenset[Run], AlignmentMessage] = {}
         self._carried: dict[frozenset[Run], _CarriedOver] = {}
+        self._said = Said()
         self._urgency = Urgency.NONE
         self._draft: Draft | None = None
         self._begun = -math.inf
@@ -133,8 +145,19 @@ class Coordinator:
 
     @property
     def maps(self) -> tuple[RobotMap, ...]:
-        """The maps of all runs of all robots."""
-        return tuple(sorted(self._maps.values(), key=lambda m: (m.robot, min(m.components))))
+        """The maps of all runs of all robots but those to be forgotten, with their marks."""
+        maps = self._said.marked(self._said.without_forgotten(self._maps))
+        return tuple(sorted(maps.values(), key=lambda m: (m.robot, min(m.components))))
+
+    @property
+    def marks_held(self) -> tuple[MapVersion, ...]:
+        """Which version of the marks of each run is here."""
+        return self._said.marks_held
+
+    @property
+    def orders(self) -> OrderLedger:
+        """The orders of operators; to be given one, see `receive_order`."""
+        return self._said.ledger
 
     @property
     def alignments_held(self) -> tuple[tuple[MapVersion, MapVersion], ...]:
@@ -199,6 +222,20 @@ class Coordinator:
         self._raise_urgency(Urgency.NOW if joined_or_parted else Urgency.SOON)
         return True
 
+    def receive_marks(self, new: MarksMessage) -> bool:
+        """Take the marks that a run of a robot made; return whether they are news."""
+        if not self.admits({new.robot}) or not self._said.take_marks(new):
+            return False
+        self._raise_urgency(Urgency.NOW)
+        return True
+
+    def receive_order(self, new: OrderMessage) -> bool:
+        """Take an operator's order; return whether it is news."""
+        if not self._said.ledger.take(new):
+            return False
+        self._raise_urgency(Urgency.NOW)
+        return True
+
     def forget_news(self) -> None:
         """Take what was received so far as part of the last version: after a restart."""
         self._urgency = Urgency.NONE
@@ -216,7 +253,8 @@ class Coordinator:
         if self._draft is not None:
             raise RuntimeError("the last draft is not finished")
         alignments = tuple(self._alignments_in_force())
-        self._draft = Draft(self._version + 1, self.maps, alignments, self._judged)
+        orders = self._said.orders(self._maps, self._said.without_forgotten(self._maps))
+        self._draft = Draft(self._version + 1, self.maps, alignments, self._judged, orders)
         self._begun, self._urgency = now, Urgency.NONE
         return self._draft
 
@@ -229,13 +267,14 @@ class Coordinator:
 
     def _alignments_in_force(self) -> Iterator[Alignment]:
         """Yield the alignments between components that exist."""
+        shown = self._said.without_forgotten(self._maps)
         existing = {
             component_name(robot_map.robot, component)
-            for robot_map in self._maps.values()
+            for robot_map in shown.values()
             for component in robot_map.components
         }
         for message in self._alignments.values():
-            if self._maps.keys() >= states_of(_ends(message)).keys():
+            if shown.keys() >= states_of(_ends(message)).keys():
                 for alignment in self._carried_over(message):
                     if {alignment.reference, alignment.other} <= existing:
                         yield alignment

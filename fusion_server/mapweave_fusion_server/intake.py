@@ -19,7 +19,10 @@ from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import (
     Arrival,
     alignment_reader,
+    held_orders_reader,
     map_reader,
+    marks_reader,
+    order_reader,
     read_coordinator,
     status_reader,
 )
@@ -31,6 +34,8 @@ from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
     MapMessage,
+    MarksMessage,
+    OrderMessage,
     StatusMessage,
 )
 from mapweave_protocol.wire.model import Message
@@ -74,6 +79,9 @@ class Intake:
         self._maps = map_reader()
         self._alignments = alignment_reader()
         self._statuses = status_reader()
+        self._marks = marks_reader()
+        self._orders = order_reader()
+        self._held_orders = held_orders_reader()
         self._heard: dict[Run, StatusMessage] = {}
         self._last_heard: dict[str, float] = {}
         self._lacking = Lacking()
@@ -81,11 +89,16 @@ class Intake:
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
         self._warned_of_too_many = False
+        self._warned_of_orders = False
 
     @property
     def refused(self) -> int:
         """How many messages were dropped because they were not what they should be."""
-        return self._maps.refused + self._alignments.refused + self._statuses.refused
+        readers = (
+            *(self._maps, self._alignments, self._statuses),
+            *(self._marks, self._orders, self._held_orders),
+        )
+        return sum(reader.refused for reader in readers)
 
     @property
     def reports(self) -> tuple[RobotReport, ...]:
@@ -112,6 +125,14 @@ class Intake:
             found = _remembered(AlignmentMessage, payload)
             if found is not None:
                 self._coordinator.receive_alignments(found)
+        for payload in self._store.last_marks():
+            marks = _remembered(MarksMessage, payload)
+            if marks is not None:
+                self._coordinator.receive_marks(marks)
+        for payload in self._store.orders():
+            order = _remembered(OrderMessage, payload)
+            if order is not None:
+                self._coordinator.receive_order(order)
         if self._coordinator.has_version and not self._store.holds_news:
             self._coordinator.forget_news()
 
@@ -131,20 +152,69 @@ class Intake:
                 self._heard[status.robot, status.boot] = status
                 self._last_heard[status.robot] = received
                 record(self._story.status(status))
+        elif self._takes_what_was_said(arrival, received):
+            return
         elif (coordinator := read_coordinator(arrival)) is not None:
             boot, here = coordinator
             record(self._story.coordinator(boot, here=here))
         elif LIVE.matches(arrival.key):
             self._take_presence(arrival)
 
+    def _takes_what_was_said(self, arrival: Arrival, received: float) -> bool:
+        """Take marks and orders; return whether `arrival` was any."""
+        if self._marks.reads(arrival):
+            marks = self._marks.read(arrival)
+            if marks is not None and self._coordinator.receive_marks(marks):
+                self._store.keep_marks((marks.robot, marks.boot), received, arrival.payload)
+        elif self._orders.reads(arrival):
+            order = self._orders.read(arrival)
+            if order is not None:
+                self.take_order(order, received)
+        elif self._held_orders.reads(arrival):
+            held = self._held_orders.read(arrival)
+            for order in held.orders if held is not None else ():
+                self.take_order(order, received)
+        else:
+            return False
+        return True
+
+    def take_order(self, order: OrderMessage, received: float) -> None:
+        """Take an operator's order, which came at `received` [s since 1970]."""
+        if self._coordinator.receive_order(order):
+            self._store.add_order(order.id, received, encode(order))
+        elif self._coordinator.orders.is_full and not self._warned_of_orders:
+            self._warned_of_orders = True
+            _log.warning("order %s of %s ignored: there are too many already", order.id, order.by)
+
     def _held_version(self, robot: str) -> int | None:
         held = self._coordinator.map_of(robot)
         return None if held is None else held.version
 
-    def robots_to_ask(self, now: float) -> list[str]:
-        """Return those whose map, by what they have said, has not arrived; `now` [s], any clock."""
+    def robots_to_ask(self, now: float) -> tuple[list[str], list[str]]:
+        """Return whom to ask for what has not arrived, by what they have said.
+
+        Parameters
+        ----------
+        now
+            [s] by any clock.
+
+        Returns
+        -------
+        maps
+            Those whose map is not here.
+        orders
+            Those who hold other orders than are here.
+        """
         heard, self._heard = self._heard, {}
-        return [robot for (robot, _), status in heard.items() if self._lacks_map(status, now)]
+        maps = [robot for (robot, _), status in heard.items() if self._lacks_map(status, now)]
+        orders = [robot for (robot, _), status in heard.items() if self._lacks_orders(status, now)]
+        return maps, orders
+
+    def _lacks_orders(self, status: StatusMessage, now: float) -> bool:
+        held = self._coordinator.orders.digest
+        lacks = status.orders not in (b"", held)
+        who = f"orders {status.robot} {status.boot}"
+        return self._lacking.due(who, (held, status.orders), now, lacks=lacks)
 
     def _lacks_map(self, status: StatusMessage, now: float) -> bool:
         held = self._coordinator.version_of(status.robot, status.boot)

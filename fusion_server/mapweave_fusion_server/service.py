@@ -19,7 +19,7 @@ from mapweave_fusion_server.storage.database import UnwritableError
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_protocol.link import session
-from mapweave_protocol.link.asking import request_all_of
+from mapweave_protocol.link.asking import request_all_of, request_orders_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.joint_changes import JointSender
@@ -33,6 +33,7 @@ POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
 ANSWERERS = 4  # one slow asker must not keep the others waiting
 WAITING_QUERIES = 256
 STATUS_INTERVAL = 1.0  # [s]
+RUNS_MARKED = 16  # of a robot whose marks come from its publisher's cache
 
 _log = logging.getLogger(__name__)
 
@@ -117,12 +118,23 @@ class Service:
         now = time.monotonic()
         if self._coordinator.seconds_until_due(now) <= 0:
             self._begin()
-        for robot in self._intake.robots_to_ask(now):
+        self._take_orders_of_page()
+        maps_of, orders_of = self._intake.robots_to_ask(now)
+        for robot in maps_of:
             request_all_of(self._session, self._team, robot, self._inbox.put)
+        for robot in orders_of:
+            request_orders_of(self._session, self._team, robot, self._inbox.put)
         if now >= self._status_due:
             self._resume_storing()
             self._publish_status()
             self._status_due = now + STATUS_INTERVAL
+
+    def _take_orders_of_page(self) -> None:
+        """Take what was ordered on the live page, and say it to those who keep orders as well."""
+        for order in self._feed.orders():
+            self._intake.take_order(order, time.time())
+            key = keys.ORDER.build(team=self._team, name=order.by, order=str(order.kind))
+            self._session.put(key, encode(order))
 
     def _finish(self) -> None:
         """Take what has arrived and publish what it makes."""
@@ -186,6 +198,8 @@ class Service:
             maps=self._coordinator.maps_held,
             alignments=self._coordinator.alignments_held,
             frames=self._frames,
+            marks=self._coordinator.marks_held,
+            orders=self._coordinator.orders.digest,
         )
         self._statuses.put(encode(status))
         self._feed.show_team(
@@ -223,6 +237,10 @@ class Service:
             for subscriber in (
                 session.declare_subscriber(self._session, maps, put, history=MESSAGES_TO_COMPLETE),
                 session.declare_subscriber(self._session, alignments, put),
+                session.declare_subscriber(
+                    self._session, keys.MARK.pattern(team=self._team), put, history=RUNS_MARKED
+                ),
+                self._session.declare_subscriber(keys.ORDER.pattern(team=self._team), put),
                 self._session.declare_subscriber(statuses, put),
                 self._session.liveliness().declare_subscriber(others, put, history=True),
                 self._session.liveliness().declare_subscriber(live, put, history=True),

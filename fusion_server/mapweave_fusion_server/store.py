@@ -4,7 +4,6 @@ Messages are kept as the bytes that travelled; nothing here can read them, and n
 a clock: times are passed in.
 """
 
-import fcntl
 import logging
 import os
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from types import TracebackType
 from mapweave.errors import FileError
 from mapweave_fusion_server.storage.database import DamagedError, Database, UnwritableError
 from mapweave_fusion_server.storage.held import Held
+from mapweave_fusion_server.storage.ownership import own
 from mapweave_fusion_server.storage.retention import Retention
 from mapweave_fusion_server.storage.rows import Row, VersionRow, drop_versions
 from mapweave_fusion_server.storage.salvage import is_sound, salvage
@@ -52,7 +52,7 @@ class Store:
         self._damage: set[str] = set()
         if is_missing(path):
             create(path, team)
-        self._owned = _own(path)
+        self._owned = own(path)
         try:
             self._database = self._open(team)
         except FileError:
@@ -91,7 +91,7 @@ class Store:
 
     @property
     def news(self) -> int:
-        """The number of the last alignment or map that was kept."""
+        """The number of the last message that was kept, versions apart."""
         return self._news
 
     @property
@@ -217,6 +217,38 @@ class Store:
         )
         return self._messages("robot_map", ((n, f"of {r}@{b}") for n, r, b in numbers))
 
+    def map_with_component(self, robot: str, component: int) -> bytes | None:
+        """Return the map of the run that the component of that number is, or was, of.
+
+        A run numbers its components above those of the runs before it.
+        """
+        numbers = self._database.rows(
+            "SELECT rowid FROM robot_map WHERE robot = ? AND last_component >= ?"
+            " ORDER BY last_component LIMIT 1",
+            robot, component,
+        )  # fmt: skip
+        return next(
+            iter(self._messages("robot_map", ((n, f"of {robot}") for (n,) in numbers))), None
+        )
+
+    def keep_marks(self, run: tuple[str, str], received: float, message: bytes) -> None:
+        """Keep the marks of a run, a robot and a boot, in place of those kept before."""
+        self._keep(run, "mark", (*run, received), message)
+
+    def last_marks(self) -> list[bytes]:
+        """Return the marks of every run of every robot that made some."""
+        numbers = self._database.rows("SELECT rowid, robot, boot FROM mark ORDER BY robot, boot")
+        return self._messages("mark", ((n, f"of {r}@{b}") for n, r, b in numbers))
+
+    def add_order(self, identity: str, received: float, message: bytes) -> None:
+        """Keep an operator's order, once."""
+        self._keep(("order", identity), "operator_order", (identity, received), message)
+
+    def orders(self) -> list[bytes]:
+        """Return all orders of operators, in the order in which they came."""
+        numbers = self._database.rows("SELECT rowid, id FROM operator_order ORDER BY news")
+        return self._messages("operator_order", ((n, i) for n, i in numbers))
+
     @property
     def holds_news(self) -> bool:
         """Whether something was received that is not in the last version."""
@@ -252,7 +284,7 @@ class Store:
             if not is_sound(database):
                 salvage(database, self.path, team)
                 database, damaged = Database(self.path), self._owned
-                self._owned = _own(self.path)
+                self._owned = own(self.path)
                 os.close(damaged)
             migrate(database)
             self._take_over(database, team)
@@ -286,7 +318,9 @@ class Store:
         [(news,)] = database.rows(
             "SELECT max((SELECT coalesce(max(covers), 0) FROM version),"
             " (SELECT coalesce(max(news), 0) FROM alignment),"
-            " (SELECT coalesce(max(news), 0) FROM robot_map))"
+            " (SELECT coalesce(max(news), 0) FROM robot_map),"
+            " (SELECT coalesce(max(news), 0) FROM mark),"
+            " (SELECT coalesce(max(news), 0) FROM operator_order))"
         )
         self._news = int(news)
 
@@ -310,20 +344,3 @@ class Store:
             self._damage.add(what)
             _log.warning("%s: damaged: %s is left out", self.path, what)
         return None
-
-
-def _own(path: Path) -> int:
-    """Take the file for this process: two coordinators would both number the next version.
-
-    Whoever only reads it is not kept out. To be closed after SQLite's own use of the file.
-    """
-    try:
-        file = os.open(path, os.O_RDONLY)
-    except OSError as error:
-        raise FileError(path, f"the store cannot be read: {error.strerror}") from error
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        os.close(file)
-        raise FileError(path, "in use by another mapweave server") from error
-    return file

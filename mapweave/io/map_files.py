@@ -20,6 +20,7 @@ from mapweave.errors import FileError
 from mapweave.evidence import RunnerUp
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
+from mapweave.io.annotations import listed, mark_content, order_content, placed_mark_content
 from mapweave.io.map_schema import JOINT_FORMAT, MAP_FORMAT, HeaderFile, JointFile, MapFile
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
 from mapweave.maps import (
@@ -126,6 +127,7 @@ def write_map(path: str | Path, robot_map: RobotMap) -> None:
         "version": robot_map.version,
         **_made_with(robot_map.made_with),
         "submaps": [_submap(submap) for submap in robot_map.submaps],
+        **listed("marks", map(mark_content, robot_map.marks)),
     }
     _write(path, content)
 
@@ -149,6 +151,7 @@ def joint_content(joint: JointMap) -> dict[str, object]:
         **_made_with(joint.made_with),
         "alignments": [alignment_content(alignment) for alignment in joint.alignments],
         "components": [_component(component) for component in joint.components],
+        **listed("orders", map(order_content, joint.orders)),
     }
 
 
@@ -299,6 +302,7 @@ def _component(component: JointComponent) -> dict[str, object]:
         "segment_confidence": _by_polyline(component.map, confidences),
         "explored_m2": round(searched.explored, 1),
         "frontiers": [np.round(line, _METRES).tolist() for line in searched.frontiers],
+        **listed("marks", map(placed_mark_content, component.marks)),
     }
 
 

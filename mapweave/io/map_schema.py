@@ -9,18 +9,12 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    StringConstraints,
-    model_validator,
-)
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.geometry.arrays import FloatArray
-from mapweave.ids import ID_PATTERN
+from mapweave.io.annotations import MarkFile, OrderFile, PlacedMarkFile
+from mapweave.io.file_types import ComponentName, Count, FileModel, Metre, Pose, RobotId
 from mapweave.maps import (
     Alignment,
     Decision,
@@ -39,12 +33,8 @@ _JointFormat: TypeAlias = Literal["mapweave/joint/1"]
 MAP_FORMAT: _MapFormat = "mapweave/map/1"
 JOINT_FORMAT: _JointFormat = "mapweave/joint/1"
 
-_Count: TypeAlias = Annotated[int, Field(ge=0, le=2**53)]
 MAX_SEGMENT = 1000.0  # [m]; no lidar sees farther
-# The bound keeps sums and squares of coordinates finite; no robot drives farther.
-_Metre: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Probability: TypeAlias = Annotated[float, Field(ge=0, le=1)]
-_Pose: TypeAlias = tuple[_Metre, _Metre, float]
 
 
 def _seen_at_once(segment: tuple[float, float, float, float]) -> tuple[float, ...]:
@@ -54,29 +44,19 @@ def _seen_at_once(segment: tuple[float, float, float, float]) -> tuple[float, ..
     return segment
 
 
-_Segment: TypeAlias = Annotated[
-    tuple[_Metre, _Metre, _Metre, _Metre], AfterValidator(_seen_at_once)
-]
+_Segment: TypeAlias = Annotated[tuple[Metre, Metre, Metre, Metre], AfterValidator(_seen_at_once)]
 _Polyline: TypeAlias = Annotated[list[_Segment], Field(min_length=1)]
-_Polygon: TypeAlias = Annotated[list[tuple[_Metre, _Metre]], Field(min_length=3)]
-_TrajectoryRow: TypeAlias = tuple[_Count, float | None, _Metre, _Metre, float]
+_Polygon: TypeAlias = Annotated[list[tuple[Metre, Metre]], Field(min_length=3)]
+_TrajectoryRow: TypeAlias = tuple[Count, float | None, Metre, Metre, float]
 _Deviation: TypeAlias = Annotated[float, Field(ge=0, le=1e6)]
 _UncertaintyRow: TypeAlias = tuple[_Deviation, _Deviation, _Deviation, float]
-_RobotId: TypeAlias = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
-_ComponentName: TypeAlias = Annotated[
-    str, StringConstraints(pattern=ID_PATTERN.removesuffix("$") + "/[0-9]{1,9}$")
-]
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(strict=True, frozen=True, extra="ignore", allow_inf_nan=False)
-
-
-class _LinesFile(_Model):
+class _LinesFile(FileModel):
     """What submaps and joint components have in common."""
 
     polylines: list[_Polyline]
-    support: list[list[_Count]]
+    support: list[list[Count]]
 
     @model_validator(mode="after")
     def _support_fits(self) -> "_LinesFile":
@@ -93,7 +73,7 @@ class _LinesFile(_Model):
         )
 
 
-class HeaderFile(_Model):
+class HeaderFile(FileModel):
     """What both kinds of file start with: enough to tell which of them it is."""
 
     format: Literal["mapweave/map/1", "mapweave/joint/1"]
@@ -102,9 +82,9 @@ class HeaderFile(_Model):
 class SubmapFile(_LinesFile):
     """One of the ``submaps`` of a map file."""
 
-    id: _Count
-    component: _Count
-    pose: _Pose
+    id: Count
+    component: Count
+    pose: Pose
     free_space: list[_Polygon]
     trajectory: list[_TrajectoryRow]
     uncertainty: list[_UncertaintyRow] | None = None
@@ -138,7 +118,7 @@ class SubmapFile(_LinesFile):
         return np.array(self.uncertainty, dtype=np.float64).reshape(-1, 4)
 
 
-class MadeWithFile(_Model):
+class MadeWithFile(FileModel):
     """What a map was made with; the settings are those of the version that made it."""
 
     program: str
@@ -149,15 +129,16 @@ class MadeWithFile(_Model):
         return MadeWith(self.program, self.config)
 
 
-class MapFile(_Model):
+class MapFile(FileModel):
     """A whole ``MAP.json``."""
 
     format: _MapFormat
-    robot: _RobotId
+    robot: RobotId
     boot: str
-    version: _Count
+    version: Count
     made_with: MadeWithFile | None = None
     submaps: list[SubmapFile]
+    marks: list[MarkFile] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _ids_ascend(self) -> "MapFile":
@@ -169,10 +150,11 @@ class MapFile(_Model):
     def to_map(self) -> RobotMap:
         """Return it as the library's value."""
         submaps = tuple(submap.to_submap() for submap in self.submaps)
-        return RobotMap(self.robot, self.boot, self.version, submaps, _known(self.made_with))
+        marks = tuple(mark.to_mark() for mark in self.marks)
+        return RobotMap(self.robot, self.boot, self.version, submaps, _known(self.made_with), marks)
 
 
-class EvidenceFile(_Model):
+class EvidenceFile(FileModel):
     """The ``evidence`` of an alignment; what could not be measured is left out or ``null``."""
 
     common: float | None = None
@@ -196,7 +178,7 @@ class EvidenceFile(_Model):
 class RunnerUpFile(EvidenceFile):
     """The ``runner_up`` of an alignment."""
 
-    transform: _Pose
+    transform: Pose
     distance: float | None = None
     turn: float | None = None
 
@@ -205,7 +187,7 @@ class RunnerUpFile(EvidenceFile):
         return RunnerUp.of(np.array(self.transform), self.numbers())
 
 
-class CauseFile(_Model):
+class CauseFile(FileModel):
     """The ``cause`` of an alignment: a kind, and beside it the numbers of that kind."""
 
     model_config = ConfigDict(extra="allow")
@@ -230,20 +212,20 @@ class CauseFile(_Model):
         return Reason.picked(ReasonKind(self.kind), known, found, self.text)
 
 
-class AlignmentFile(_Model):
+class AlignmentFile(FileModel):
     """One of the ``alignments`` of a joint map file."""
 
-    reference: _ComponentName
-    other: _ComponentName
-    transform: _Pose
+    reference: ComponentName
+    other: ComponentName
+    transform: Pose
     confidence: _Probability
     decision: Decision
     reason: str
     evidence: EvidenceFile
     runner_up: RunnerUpFile | None
     status: StatusKind | None = None
-    set_aside_by: list[tuple[_ComponentName, _ComponentName]] = []
-    revoked_in: _Count | None = None
+    set_aside_by: list[tuple[ComponentName, ComponentName]] = Field(default_factory=list)
+    revoked_in: Count | None = None
     cause: CauseFile | None = None
 
     @model_validator(mode="after")
@@ -279,12 +261,13 @@ class AlignmentFile(_Model):
 class ComponentFile(_LinesFile):
     """One of the ``components`` of a joint map file."""
 
-    robots: Annotated[dict[_ComponentName, _Pose], Field(min_length=1)]
+    robots: Annotated[dict[ComponentName, Pose], Field(min_length=1)]
     confidence: _Probability
     segment_confidence: list[list[_Probability]]
-    free_space: list[_Polygon] = []
+    free_space: list[_Polygon] = Field(default_factory=list)
     explored_m2: float | None = None  # both follow from the map, and are not read
-    frontiers: list[list[tuple[float, float]]] = []
+    frontiers: list[list[tuple[float, float]]] = Field(default_factory=list)
+    marks: list[PlacedMarkFile] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _confidence_fits(self) -> "ComponentFile":
@@ -298,17 +281,19 @@ class ComponentFile(_LinesFile):
             confidence=self.confidence,
             map=self.line_map(self.free_space),
             segment_confidence=np.array(_flat(self.segment_confidence), dtype=np.float64),
+            marks=tuple(mark.to_mark() for mark in self.marks),
         )
 
 
-class JointFile(_Model):
+class JointFile(FileModel):
     """A whole ``JOINT.json``."""
 
     format: _JointFormat
-    version: _Count
+    version: Count
     made_with: MadeWithFile | None = None
     alignments: list[AlignmentFile]
     components: list[ComponentFile]
+    orders: list[OrderFile] = Field(default_factory=list)
 
     def to_map(self) -> JointMap:
         """Return it as the library's value."""
@@ -317,6 +302,7 @@ class JointFile(_Model):
             components=tuple(component.to_component() for component in self.components),
             alignments=tuple(alignment.to_alignment() for alignment in self.alignments),
             made_with=_known(self.made_with),
+            orders=tuple(order.to_order() for order in self.orders),
         )
 
 

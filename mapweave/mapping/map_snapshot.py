@@ -63,6 +63,11 @@ class MapSnapshot:
         """Return `builder` as it is now."""
         return pickle.dumps(builder, pickle.HIGHEST_PROTOCOL)
 
+    @property
+    def submaps(self) -> tuple[Submap, ...]:
+        """All submaps where they are, the growing one without its lines."""
+        return self.finished if self.growing is None else (*self.finished, self.growing)
+
     def robot_map(self) -> RobotMap:
         """Draw the map."""
         submaps = with_walls(self.finished, self.unsettled)

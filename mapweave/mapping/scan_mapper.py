@@ -3,12 +3,16 @@
 from typing import Protocol
 
 from mapweave.mapping.placement import Placement
-from mapweave.maps import RobotMap
+from mapweave.maps import RobotMap, Submap
 from mapweave.scan.scan import Scan
 
 
 class Drawable(Protocol):
     """A map at one moment, to be drawn by any thread."""
+
+    @property
+    def submaps(self) -> tuple[Submap, ...]:
+        """All submaps where they are, the growing one without its lines."""
 
     def robot_map(self) -> RobotMap:
         """Draw it."""

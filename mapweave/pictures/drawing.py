@@ -1,7 +1,7 @@
 """Draws scenes into axes, in metres; needs matplotlib.
 
 Beneath lies the free space, over it the walls, dark and strong where many scans saw them, and on
-top the paths.
+top the paths and the marks.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,6 +28,7 @@ WALLS = LinearSegmentedColormap.from_list("walls", [WEAK_WALL, INK])
 WALL_WIDTH = (0.4, 1.3)  # seen by one scan, and by many [pt]
 STRONG = 85  # percentile of the support from which on a wall is drawn in full strength
 TINT = 0.13  # opacity of the floor a robot saw
+MARK, MARK_FONT = "#b0003a", 7.5  # colour, size [pt]
 GLIMPSE = 0.1  # [m] half the width of a glimpse through a gap; narrower ones only streak the floor
 
 
@@ -67,6 +68,7 @@ def draw_scene(axes: Axes, placed: PlacedScene, style: Style) -> None:
     _draw_floors(axes, placed, style)
     _draw_walls(axes, placed, style.strong)
     _draw_paths(axes, placed, style)
+    _draw_marks(axes, placed)
 
 
 def _draw_floors(axes: Axes, placed: PlacedScene, style: Style) -> None:
@@ -158,3 +160,33 @@ def _draw_start(axes: Axes, pose: FloatArray, colour: str, name: str) -> None:
         zorder=5,
         gid=name,
     )
+
+
+def _draw_marks(axes: Axes, placed: PlacedScene) -> None:
+    """Draw a cross in a ring at each mark, and its label beside it."""
+    for mark in placed.scene.marks:
+        x, y = se2.transform_points(placed.pose, mark.position).tolist()
+        axes.plot(
+            x,
+            y,
+            marker="X",
+            markersize=7.0,
+            linestyle="none",
+            color=MARK,
+            markeredgecolor="white",
+            markeredgewidth=0.8,
+            zorder=7,
+            gid=f"mark-{mark.id}",
+        )
+        axes.annotate(
+            mark.label,
+            (x, y),
+            xytext=(5.0, 3.0),
+            textcoords="offset points",
+            fontsize=MARK_FONT,
+            fontweight="bold",
+            color=MARK,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},
+            parse_math=False,
+            zorder=7,
+        )

@@ -87,6 +87,7 @@ def _points(scene: Scene) -> FloatArray:
             *scene.map.free_space,
             *(polygon for polygons in scene.seen.values() for polygon in polygons),
             *(path.pose[:, :2] for path in scene.paths),
+            *(mark.position[None] for mark in scene.marks),
             *origins,
         ]
     )

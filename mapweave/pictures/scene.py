@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mapweave.anchors import placed_marks
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.maps import (
@@ -17,6 +18,7 @@ from mapweave.maps import (
     component_name,
     parse_component,
 )
+from mapweave.marks import PlacedMark
 from mapweave.text import percent
 
 
@@ -63,6 +65,8 @@ class Scene:
         Of a joint component: that it hangs together rightly; None for a robot's own map.
     segment_confidence
         (n,) for each segment, None for a robot's own map.
+    marks
+        What was marked, frame of the scene.
     """
 
     name: str
@@ -72,6 +76,7 @@ class Scene:
     paths: tuple[ScenePath, ...]
     confidence: float | None = None
     segment_confidence: FloatArray | None = None
+    marks: tuple[PlacedMark, ...] = ()
 
 
 def robot_of(component: str) -> str:
@@ -135,6 +140,7 @@ def _robot_scene(robot_map: RobotMap, component: int) -> Scene:
         lines,
         {name: lines.free_space},
         tuple(path for path in paths if len(path.pose)),
+        marks=tuple(mark for mark in placed_marks(robot_map) if mark.component == name),
     )
 
 
@@ -176,6 +182,7 @@ def _joint_scene(component: JointComponent, known: Mapping[str, Scene]) -> Scene
         ),
         component.confidence,
         component.segment_confidence,
+        component.marks,
     )
 
 

@@ -31,6 +31,7 @@ from mapweave.team.contradictions import (
 from mapweave.team.cycles import Edge, misfit, poses_along
 from mapweave.team.inliers import component_confidence, part_right, rely, weakest_link
 from mapweave.team.min_cut import groups
+from mapweave.team.orders.bans import Ban, Bans
 
 
 class AlignmentGraphParameters(StageParameters):
@@ -65,6 +66,7 @@ def cluster_components(
     parameters: AlignmentGraphParameters,
     rasters: Mapping[str, DistanceField] | None = None,
     verdicts: KnownVerdicts | None = None,
+    bans: Sequence[Ban] = (),
 ) -> tuple[list[Cluster], tuple[Alignment, ...]]:
     """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
 
@@ -80,10 +82,12 @@ def cluster_components(
         middles, because that depends on no frame; without a map, at the component's origin.
     verdicts
         Of maps about each other, those of versions before among them.
+    bans
+        What operators forbid, between the numbers of `names` and at the maps' middles.
     """
     known = set(names)
     alignments = [a for a in alignments if a.reference in known and a.other in known]
-    graph = _Graph(names, alignments, parameters, rasters or {}, verdicts)
+    graph = _Graph(names, alignments, parameters, rasters or {}, verdicts, bans)
     judged = tuple(graph.judge(alignment) for alignment in alignments)
     return sorted(graph.clusters(), key=lambda c: -len(c.poses)), judged
 
@@ -98,10 +102,11 @@ class _Graph:
         parameters: AlignmentGraphParameters,
         rasters: Mapping[str, DistanceField],
         verdicts: KnownVerdicts | None,
+        bans: Sequence[Ban],
     ) -> None:
         self._names, self._parameters = names, parameters
         self._number = {name: number for number, name in enumerate(names)}
-        self._middles = np.array([_frame_at_middle(rasters.get(name)) for name in names])
+        self._middles = np.array([frame_at_middle(rasters.get(name)) for name in names])
         links = [a for a in alignments if a.decision == "accepted" and a.reference != a.other]
         # In an order of their own, so that the order in which they came changes nothing.
         links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
@@ -112,7 +117,8 @@ class _Graph:
         witnesses = PairVerdicts(seen, self._middles, parameters.contradictions, verdicts)
         self._doubts = MapContradictions(len(names), self._edges, witnesses)
         p = parameters.explanations
-        self._explanations = explain(len(names), self._edges, p, self._doubts)
+        self._bans = Bans(len(names), self._edges, bans)
+        self._explanations = explain(len(names), self._edges, p, self._doubts, self._bans)
         self._right = rely(len(names), self._edges, self._explanations)
 
     def _edge(self, link: Alignment) -> Edge:
@@ -120,7 +126,8 @@ class _Graph:
         there = se2.compose(link.transform, self._middles[second])
         # What is asked first is whether the places are right; that maps are bent is no objection.
         bent = bend(link.evidence.reach or 0.0, self._parameters.reach)
-        return Edge(first, second, se2.between(self._middles[first], there), _place(link), bent)
+        transform = se2.between(self._middles[first], there)
+        return Edge(first, second, transform, _place(link), bent, pinned=_is_pinned(link))
 
     def clusters(self) -> list[Cluster]:
         """Return the clusters, in the order of their first components."""
@@ -138,7 +145,9 @@ class _Graph:
         """Return `alignment`: less sure if others contradict it, and ambiguous if set aside."""
         edge = self._edge_of.get(id(alignment))
         if edge is None:
-            return alignment if alignment.status is None else replace(alignment, status=None)
+            is_judged = alignment.cause.kind is ReasonKind.FORBIDDEN
+            known = alignment.status is None or is_judged
+            return alignment if known else replace(alignment, status=None)
         sure = min(alignment.confidence, part_right(edge, self._explanations))
         if edge not in self._right:
             cause, by = self._objection(edge, alignment.cause)
@@ -154,6 +163,10 @@ class _Graph:
         """Return what speaks against edge `k`, of which this was `found`, and who says so."""
         edge = self._edges[k]
         present = sorted(self._right)
+        ban = self._bans.broken_by(k, present)
+        if ban is not None:
+            cause = Reason(ReasonKind.FORBIDDEN_BETWEEN, found=found, text=ban.words)
+            return cause, (ban.names,)
         poses, paths = poses_along(edge.first, len(self._names), self._edges, present)
         if paths[edge.second] >= 0:
             off = misfit(edge.transform, poses[edge.first], poses[edge.second])
@@ -225,10 +238,15 @@ class _Graph:
             yield self._edges[k], not cycles >> k & 1
 
 
+def _is_pinned(link: Alignment) -> bool:
+    return link.cause.kind is ReasonKind.PINNED
+
+
 def _place(link: Alignment) -> float:
     """How probably the place is right; all that is known where nobody tells of the place."""
     place = link.evidence.place
-    return place if place is not None and math.isfinite(place) else link.confidence
+    told = place is not None and math.isfinite(place) and not _is_pinned(link)
+    return place if told and place is not None else link.confidence
 
 
 def _rigid(link: Alignment) -> float:
@@ -242,7 +260,7 @@ def _covariance(edge: Edge, p: AlignmentGraphParameters) -> FloatArray:
     return np.diag([squared, squared, p.turn_sigma**2])
 
 
-def _frame_at_middle(raster: DistanceField | None) -> FloatArray:
-    """(3,) frame at the middle of a map's wall; the map's own where it has seen none."""
+def frame_at_middle(raster: DistanceField | None) -> FloatArray:
+    """Return the (3,) frame at the middle of a map's wall; the map's own where it has seen none."""
     x, y = raster.oriented.points.mean(axis=0) if raster else (0.0, 0.0)
     return np.array([x, y, 0.0])

@@ -24,6 +24,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.team.cycles import CycleParameters, Edge, bad_cycles, bad_cycles_through
 from mapweave.team.min_cut import Union
+from mapweave.team.orders.bans import Bans, pinned
 
 
 class ConsistencyParameters(BaseModel):
@@ -97,14 +98,17 @@ def explain(
     edges: Sequence[Edge],
     parameters: ConsistencyParameters,
     contradictions: Contradictions | None = None,
+    bans: Bans | None = None,
 ) -> list[ConsistentSet]:
     """Return the explanations of `edges` between `count` nodes, the most probable first.
 
     Of each cycle that does not close one edge must go. The sets of edges to remove are tried from
     the least costly, so the first that leaves only cycles that close is the most probable. Where
-    that takes too long, what is in most of such cycles goes first.
+    that takes too long, what is in most of such cycles goes first. Edges that are pinned never go;
+    of those that join what `bans` forbid one must.
     """
-    found = _Search(count, edges, parameters, contradictions or _no_doubt).run()
+    bans = bans or Bans(count, edges, ())
+    found = _Search(count, edges, parameters, contradictions or _no_doubt, bans).run()
     least = found[0].cost
     return [
         ConsistentSet(
@@ -132,10 +136,12 @@ class _Search:
         edges: Sequence[Edge],
         p: ConsistencyParameters,
         contradictions: Contradictions,
+        bans: Bans,
     ) -> None:
         self._count, self._edges, self._p, self._doubts = count, edges, p, contradictions
+        self._bans, self._free = bans, ~pinned(edges)
         self._odds = [p.log_odds(edge.confidence) for edge in edges]
-        self._cycles = bad_cycles(count, edges, 0, p.cycles)
+        self._cycles = self._looked_for(0)
         self._whole = self._independent_cycles(0)
         self._waiting = [_Candidate(0.0, 0)]
         self._seen = {0}
@@ -167,12 +173,12 @@ class _Search:
         if candidate.doubt is not None:
             self._found.append(candidate)
             return
-        conflict = self._bad_cycle(candidate.removed)
+        conflict = self._bad_cycle(candidate.removed) or self._bans(candidate.removed)
         if not conflict:
             doubt, conflict = self._doubts(candidate.removed)
             believed = _Candidate(candidate.cost + doubt, candidate.removed, doubt)
             heapq.heappush(self._waiting, believed)
-        for k in bits(conflict):
+        for k in bits(conflict & self._free):
             self._consider(candidate.removed | 1 << k)
 
     def _consider(self, removed: int) -> None:
@@ -187,9 +193,14 @@ class _Search:
                 return cycle
         if not removed:
             return 0  # all were looked at in the beginning
-        news = bad_cycles(self._count, self._edges, removed, self._p.cycles)
+        news = self._looked_for(removed)
         self._cycles += news
         return news[0] if news else 0
+
+    def _looked_for(self, removed: int) -> list[int]:
+        """Return the cycles that do not close, but for those that are pinned all around."""
+        found = bad_cycles(self._count, self._edges, removed, self._p.cycles)
+        return [cycle for cycle in found if cycle & self._free]
 
     def _cost(self, removed: int) -> float:
         odds = sum(self._odds[k] for k in bits(removed))
@@ -209,21 +220,33 @@ class _Search:
         """Remove what is in most cycles until all close; then bring back what still agrees."""
         while self._bad_cycle(removed):
             left = [cycle for cycle in self._cycles if not cycle & removed]
-            counts = [sum(cycle >> k & 1 for cycle in left) for k in range(len(self._edges))]
-            worst = max(range(len(counts)), key=lambda k: (counts[k], -self._odds[k]))
+            counts = {
+                k: sum(cycle >> k & 1 for cycle in left)
+                for k in range(len(self._edges))
+                if self._free >> k & 1
+            }
+            worst = max(counts, key=lambda k: (counts[k], -self._odds[k]))
             removed |= 1 << worst
+        while banned := self._bans(removed):
+            removed |= 1 << min(bits(banned), key=lambda k: self._odds[k])
         for k in sorted(bits(removed), key=lambda k: -self._odds[k]):
-            present = [j for j in range(len(self._edges)) if j == k or not removed >> j & 1]
-            root = self._edges[k].first
-            if not bad_cycles_through(root, self._count, self._edges, present, self._p.cycles):
+            if self._agrees(k, removed & ~(1 << k)):
                 removed &= ~(1 << k)
         return self._remove_doubted(removed)
+
+    def _agrees(self, k: int, removed: int) -> bool:
+        """Tell whether edge `k` agrees with all that is left once `removed` are not there."""
+        present = [j for j in range(len(self._edges)) if not removed >> j & 1]
+        root = self._edges[k].first
+        cycles = bad_cycles_through(root, self._count, self._edges, present, self._p.cycles)
+        return not any(cycle & self._free for cycle in cycles) and not self._bans(removed)
 
     def _remove_doubted(self, removed: int) -> _Candidate:
         """Remove the weakest of what is doubted most, as far as that is the more probable."""
         tried = []
         while True:
             doubt, doubted = self._doubts(removed)
+            doubted &= self._free
             tried.append(_Candidate(self._cost(removed) + doubt, removed, doubt))
             if not doubted:
                 return min(tried)

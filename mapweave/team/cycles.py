@@ -47,6 +47,8 @@ class Edge:
         That it is right, before others are asked.
     bend
         [m] standard deviation along x and y that bent maps add to what it errs by.
+    pinned
+        Whether an operator says that it is right: then it is, whatever else is found.
     """
 
     first: int
@@ -54,6 +56,7 @@ class Edge:
     transform: FloatArray
     confidence: float
     bend: float = 0.0
+    pinned: bool = False
 
     @cached_property
     def forth(self) -> Pose:

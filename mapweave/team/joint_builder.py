@@ -6,6 +6,7 @@ anew of the same: so a version is the same whatever was built before.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from mapweave.maps import (
     Alignment,
@@ -18,10 +19,13 @@ from mapweave.maps import (
     submaps_by_component,
 )
 from mapweave.matching.distance_field import DistanceField
-from mapweave.team.alignment_graph import Cluster, cluster_components
+from mapweave.orders import Order
+from mapweave.team.alignment_graph import Cluster, cluster_components, frame_at_middle
 from mapweave.team.contradictions import KnownVerdicts
 from mapweave.team.joining import JointParameters, Kept, Piece, join
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
+from mapweave.team.orders.joint_marks import HeldMarks, held_marks, laid_down
+from mapweave.team.orders.rulings import Rulings
 from mapweave.team.recent import Recent
 
 
@@ -49,23 +53,35 @@ class JointMapBuilder:
         self._kept = Kept()
 
     def build(
-        self, maps: Sequence[RobotMap], alignments: Sequence[Alignment], version: int
+        self,
+        maps: Sequence[RobotMap],
+        alignments: Sequence[Alignment],
+        version: int,
+        orders: Sequence[Order] = (),
     ) -> JointMap:
         """Return what the team knows, its robots' submaps woven together.
 
         Alignments that contradict others, or what robots saw, are set aside: they stay in the joint
-        map as ambiguous, the reason saying so.
+        map as ambiguous, the reason saying so. What operators ordered goes before.
         """
         for kept in (self._wholes, self._rasters, self._verdicts, self._kept):
             kept.turn()
         submaps = submaps_by_component(maps)
         found = {name: self._whole(each) for name, each in submaps.items()}
         rasters = {name: raster for name, raster in found.items() if raster is not None}
+        middles = {name: frame_at_middle(found[name]) for name in submaps}
+        rulings = Rulings.of(orders, sorted(submaps), middles)
         clusters, judged = cluster_components(
-            sorted(submaps), alignments, self.parameters.graph, rasters, self._verdicts
+            sorted(submaps),
+            rulings.applied(alignments),
+            self.parameters.graph,
+            rasters,
+            self._verdicts,
+            rulings.bans,
         )
-        joined = tuple(self._join(cluster, submaps, judged) for cluster in clusters)
-        return JointMap(version, joined, judged)
+        marks = held_marks(maps)
+        joined = tuple(self._join(cluster, submaps, judged, marks) for cluster in clusters)
+        return JointMap(version, joined, judged, orders=rulings.orders)
 
     def _whole(self, submaps: Sequence[Submap]) -> DistanceField | None:
         """Return the raster of a component; None where it has seen no wall."""
@@ -77,6 +93,7 @@ class JointMapBuilder:
         cluster: Cluster,
         submaps: Mapping[str, Sequence[Submap]],
         judged: Sequence[Alignment],
+        marks: HeldMarks,
     ) -> JointComponent:
         """Join a cluster, its submaps where they fit; a component alone stays as it is."""
         poses = {name: [s.pose for s in submaps[name]] for name in cluster.poses}
@@ -90,7 +107,8 @@ class JointMapBuilder:
             ]
             for name, those in poses.items()
         }
-        return join(cluster, pieces, self.parameters, self._kept)
+        joined = join(cluster, pieces, self.parameters, self._kept)
+        return replace(joined, marks=laid_down(marks, cluster.poses, submaps, poses))
 
     def _raster(self, lines: LineMap) -> DistanceField | None:
         return self._rasters.get(lines, lambda: rasterise(lines, self.parameters))

@@ -1,14 +1,18 @@
 """What a robot hears goes to its plan of comparisons, but for what it said itself."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
+from mapweave_agent.by_hand.kept_orders import KeptOrders
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
+from mapweave_agent.past_runs import StateFolder
 from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.wire import keys
@@ -57,10 +61,12 @@ def found_by(robot: str) -> Arrival:
 class Robot:
     """One that has a map and listens."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, folder: Path) -> None:
         self.plan = ComparisonSchedule(name, AgentParameters())
         self.plan.own_map(a_map(name), finished=True)
-        self._dispatcher = Dispatcher(name, "x", self.plan, Needs(name), Whereabouts(name, "x", 0))
+        self.orders = KeptOrders(StateFolder(folder))
+        whereabouts = Whereabouts(name, "x", 0)
+        self._dispatcher = Dispatcher(name, "x", self.plan, Needs(name), whereabouts, self.orders)
 
     def hears(self, *arrivals: Arrival) -> None:
         """Take in what arrives, in this order."""
@@ -73,16 +79,16 @@ class Robot:
         return self._dispatcher.refused
 
 
-def test_the_map_of_a_peer_is_something_to_compare_and_the_own_one_is_not() -> None:
-    robot = Robot(OURS)
+def test_the_map_of_a_peer_is_something_to_compare_and_the_own_one_is_not(tmp_path: Path) -> None:
+    robot = Robot(OURS, tmp_path)
     robot.hears(token_of(OURS), map_of(OURS, 9))
     assert robot.plan.idle
     robot.hears(token_of(PEER), map_of(PEER))
     assert not robot.plan.idle
 
 
-def test_a_robot_takes_over_when_it_hears_that_the_responsible_one_is_gone() -> None:
-    robot = Robot(PEER)
+def test_a_robot_takes_over_when_it_hears_that_the_responsible_one_is_gone(tmp_path: Path) -> None:
+    robot = Robot(PEER, tmp_path)
     robot.hears(token_of(OURS), map_of(OURS))
     assert robot.plan.idle
     robot.hears(token_of(OURS, gone=True))
@@ -90,9 +96,9 @@ def test_a_robot_takes_over_when_it_hears_that_the_responsible_one_is_gone() -> 
 
 
 def test_another_run_of_the_robot_itself_is_nobody_to_compare_with(
-    caplog: pytest.LogCaptureFixture,
+    caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
-    robot = Robot(OURS)
+    robot = Robot(OURS, tmp_path)
     robot.hears(token_of(OURS, boot="y"), token_of(OURS, boot="x"))
     assert caplog.text.count("2 agents call themselves") == 1
     assert robot.plan.idle
@@ -100,9 +106,9 @@ def test_another_run_of_the_robot_itself_is_nobody_to_compare_with(
 
 @pytest.mark.parametrize(("state", "at_once"), [("mapping", False), ("finished", True)])
 def test_a_pair_rests_until_the_peer_says_that_its_map_is_the_last(
-    state: str, at_once: bool
+    state: str, at_once: bool, tmp_path: Path
 ) -> None:
-    robot = Robot(OURS)
+    robot = Robot(OURS, tmp_path)
     robot.hears(token_of(PEER), map_of(PEER))
     comparison = robot.plan.begin(0.0)
     assert comparison is not None
@@ -111,14 +117,16 @@ def test_a_pair_rests_until_the_peer_says_that_its_map_is_the_last(
     assert (robot.plan.begin(0.1) is not None) == at_once
 
 
-def test_what_a_peer_found_of_the_pair_spares_the_comparison() -> None:
-    robot = Robot(PEER)
+def test_what_a_peer_found_of_the_pair_spares_the_comparison(tmp_path: Path) -> None:
+    robot = Robot(PEER, tmp_path)
     robot.hears(token_of(OURS), map_of(OURS), found_by(OURS), token_of(OURS, gone=True))
     assert robot.plan.idle
 
 
-def test_what_the_robot_itself_published_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = Robot(PEER)
+def test_what_the_robot_itself_published_is_no_news(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    robot = Robot(PEER, tmp_path)
     learned: list[AlignmentMessage] = []
     monkeypatch.setattr(robot.plan, "learned", learned.append)
     robot.hears(found_by(PEER))
@@ -127,8 +135,8 @@ def test_what_the_robot_itself_published_is_no_news(monkeypatch: pytest.MonkeyPa
     assert [message.robot for message in learned] == [OURS]
 
 
-def test_what_is_no_message_is_counted_and_changes_nothing() -> None:
-    robot = Robot(OURS)
+def test_what_is_no_message_is_counted_and_changes_nothing(tmp_path: Path) -> None:
+    robot = Robot(OURS, tmp_path)
     for key in (map_of(PEER).key, status_of(PEER, "mapping", 1).key, found_by(PEER).key):
         robot.hears(Arrival(key, b"nonsense"))
     assert robot.refused == 3

@@ -112,6 +112,7 @@ def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(
     endpoint: str, team: str, logs: list[Path]
 ) -> None:
     scans, told, all_told = scans_of(logs[0]), list[PoseMessage](), threading.Event()
+    awaited = []
 
     def tell(pose: PoseMessage) -> None:
         told.append(pose)
@@ -122,12 +123,14 @@ def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(
         "a", team, connect=endpoint, patience=PATIENCE, on_pose=tell
     ) as agent:
         for index, scan in enumerate(scans):
+            awaited += [index] * bool(told)  # who subscribes is late: the first ones may be lost
             agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
-            while agent.waiting or (told and told[-1].scan_index < index):
+            while agent.waiting or (index in awaited and told[-1].scan_index < index):
                 time.sleep(0.005)
         assert all_told.wait(PATIENCE)
     mapper, heard = Mapper("a"), {pose.scan_index: pose for pose in told}
-    assert sorted(heard) == list(range(told[0].scan_index, len(scans)))  # who subscribes is late
+    assert set(awaited) <= set(heard)
+    assert len(awaited) > len(scans) / 2
     for index, scan in enumerate(scans):
         placement = mapper.add(scan)
         if index in heard and placement.pose is not None:

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TypeAlias
@@ -20,6 +20,7 @@ import pytest
 import zenoh
 import zenoh.ext as ze
 
+from mapweave.evidence import Evidence
 from mapweave.geometry import se2
 from mapweave.maps import (
     Alignment,
@@ -87,12 +88,14 @@ def _make_alignments(
     transform: tuple[float, float, float] = (0.0, 0.0, 0.0),
     confidence: float = 0.9,
     reason: str = "40 m of wall in common",
+    evidence: Mapping[str, float] | None = None,
 ) -> AlignmentMessage:
     """Return what robot `reference` found for the first component of both."""
     ends = (component_name(m.robot, min(m.components, default=0)) for m in (reference, other))
     ours, theirs = ends
     cause = Reason.words(reason)
-    alignment = Alignment(ours, theirs, np.array(transform), decision, confidence, cause)
+    measured = Evidence.of(evidence or {})
+    alignment = Alignment(ours, theirs, np.array(transform), decision, confidence, cause, measured)
     return AlignmentMessage.pack(
         reference.robot, MapVersion.of(reference), MapVersion.of(other), [alignment]
     )

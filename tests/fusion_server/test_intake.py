@@ -76,7 +76,7 @@ def test_a_robot_whose_map_has_not_come_is_asked_for_it(
         intake = Intake(Coordinator(CoordinatorParameters()), store, Story())
         intake.take(Arrival(MAP.build(team="t", robot="a"), MapSender().payload(held)), 0.0)
         intake.take(status, 0.0)
-        assert intake.robots_to_ask(0.0) == []  # it may be on its way
+        assert intake.robots_to_ask(0.0) == ([], [])  # it may be on its way
         intake.take(status, 0.0)
-        assert intake.robots_to_ask(GRACE) == asked
-        assert intake.robots_to_ask(10 * GRACE) == []  # nothing was heard since
+        assert intake.robots_to_ask(GRACE) == (asked, [])
+        assert intake.robots_to_ask(10 * GRACE) == ([], [])  # nothing was heard since

@@ -55,6 +55,11 @@ ELSE = "12 m of wall in common, 3.0 m contradicted"
          f"{TOLD}; but from there the maps go on for 40 m, where they may be bent by more than"
          " 0.5 m: right as a whole with 40% only"),
         (Reason(ReasonKind.MET_BEFORE, found=FOUND), f"the robots met before; {TOLD}"),
+        (Reason(ReasonKind.PINNED, text="anna: same door"), "pinned by anna: same door"),
+        (Reason(ReasonKind.PINNED, found=FOUND, text="anna: same door"),
+         f"pinned by anna: same door; {TOLD}"),
+        (Reason(ReasonKind.FORBIDDEN, found=FOUND, text="anna: two floors"),
+         f"forbidden by anna: two floors; {TOLD}"),
         (Reason(ReasonKind.REBASED),
          "what was compared is in another component by now; to be compared again"),
         (Reason(ReasonKind.UNDECIDED, found=FOUND),
@@ -148,6 +153,9 @@ def test_a_reason_has_the_numbers_of_its_kind_and_no_other(kind: ReasonKind) -> 
     for name in numbers:
         with pytest.raises(ValueError, match=name):
             Reason(kind, {n: v for n, v in numbers.items() if n != name}, found)
+    if kind is ReasonKind.PINNED:  # also where nothing was found
+        Reason(kind, numbers)
+        return
     with pytest.raises(ValueError, match="what was found before"):
         Reason(kind, numbers, None if found else FOUND)
 
@@ -157,7 +165,7 @@ def test_of_a_rival_all_is_known_or_nothing() -> None:
         Reason(ReasonKind.CONVINCING, {**MATCH, "distance": 3.0})
 
 
-def test_only_words_have_a_text_and_reasons_in_a_row_are_bounded() -> None:
+def test_only_words_and_orders_have_a_text_and_reasons_in_a_row_are_bounded() -> None:
     with pytest.raises(ValueError, match="no words"):
         Reason(ReasonKind.NO_SHAPE, text="so")
     deep = FOUND

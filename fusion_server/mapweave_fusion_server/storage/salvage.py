@@ -14,6 +14,8 @@ COLUMNS = {
     "version": "number, created, message, checksum, covers",
     "alignment": "id, received, first, second, message, checksum, news",
     "robot_map": "robot, boot, last_component, received, message, checksum, news",
+    "mark": "robot, boot, received, message, checksum, news",
+    "operator_order": "id, received, message, checksum, news",
 }
 PROBED = 20_000  # rows tried one by one between those that can be reached from either end
 

@@ -12,10 +12,26 @@ from mapweave_fusion_server.storage.database import Database
 APPLICATION_ID = 0x4D505756  # "MPWV", in the file's header (SQLite file format, 1.3.17)
 SCHEMA_VERSION = 3
 OLDEST_SCHEMA = 2
-MESSAGE_TABLES = ("version", "alignment", "robot_map")
+MESSAGE_TABLES = ("version", "alignment", "robot_map", "mark", "operator_order")
 _HEADER_LENGTH = 100
 _MAGIC = b"SQLite format 3\0"
 
+_SAID = (  # by people and programs
+    """CREATE TABLE mark (
+    robot TEXT NOT NULL,
+    boot TEXT NOT NULL,              -- of the run that made them
+    received REAL NOT NULL,
+    message BLOB NOT NULL,
+    checksum INTEGER NOT NULL,
+    news INTEGER NOT NULL,
+    PRIMARY KEY (robot, boot))""",
+    """CREATE TABLE operator_order (
+    id TEXT PRIMARY KEY,
+    received REAL NOT NULL,
+    message BLOB NOT NULL,
+    checksum INTEGER NOT NULL,
+    news INTEGER NOT NULL)""",
+)
 _SCHEMA = f"""
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = {SCHEMA_VERSION};
@@ -47,11 +63,13 @@ CREATE TABLE robot_map (
     checksum INTEGER NOT NULL,
     news INTEGER NOT NULL,
     PRIMARY KEY (robot, boot));
+{";".join(_SAID)};
 """
 
 # What was received up to a time was in the version that was begun then.
 _EARLIER = "(SELECT received FROM alignment UNION ALL SELECT received FROM robot_map)"
 _FROM_2 = (
+    *_SAID,
     "ALTER TABLE owner ADD COLUMN inode INTEGER",
     "ALTER TABLE version ADD COLUMN checksum INTEGER NOT NULL DEFAULT 0",
     "ALTER TABLE version ADD COLUMN covers INTEGER NOT NULL DEFAULT 0",

@@ -1,13 +1,14 @@
 """What the coordinator hands over to those who look: immutable values, never waited for."""
 
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 from mapweave.maps import RobotMap
 from mapweave_fusion_server.web.positions import Positions
-from mapweave_protocol.wire.messages import StatusMessage
+from mapweave_protocol.wire.messages import OrderMessage, StatusMessage
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +78,14 @@ class Seen:
 
 
 Listener = Callable[[Seen], object]
+MAX_WAITING = 64  # orders
 
 
 class Feed:
     """Keeps what was handed over last, and tells those who listen; usable from several threads.
 
-    A listener is called in the thread of the coordinator, and must return at once.
+    A listener is called in the thread of the coordinator, and must return at once. Orders go the
+    other way: they wait until the coordinator takes them.
 
     Attributes
     ----------
@@ -93,6 +96,7 @@ class Feed:
     def __init__(self) -> None:
         self.positions = Positions()
         self._lock = threading.Lock()
+        self._orders: deque[OrderMessage] = deque()
         self._seen = Seen()
         self._listeners: tuple[Listener, ...] = ()
 
@@ -111,6 +115,21 @@ class Feed:
         finally:
             with self._lock:
                 self._listeners = tuple(one for one in self._listeners if one is not listener)
+
+    def give_order(self, order: OrderMessage) -> bool:
+        """Have the coordinator take `order`; return whether there is room for it to wait."""
+        with self._lock:
+            if len(self._orders) >= MAX_WAITING:
+                return False
+            self._orders.append(order)
+            return True
+
+    def orders(self) -> list[OrderMessage]:
+        """Take the orders that wait."""
+        with self._lock:
+            waiting = list(self._orders)
+            self._orders.clear()
+        return waiting
 
     def show_version(self, version: int, maps: tuple[RobotMap, ...]) -> None:
         """Hand over that `version` is in the store, made of `maps`."""

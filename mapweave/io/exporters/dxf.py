@@ -1,8 +1,9 @@
 """Maps as DXF drawings (R2010, metres), for programs of architects; needs `ezdxf`.
 
 The layers of a component are ``a_0 walls``, ``a_0 free space`` and ``a_0 path``, or for a joint
-component ``a_0 + b_0 walls`` and so on, and ``robot a_0`` with a point at the origin of each
-robot's own component: a slash is not allowed in their names. Each component is drawn in its own
+component ``a_0 + b_0 walls`` and so on, ``robot a_0`` with a point at the origin of each robot's
+own component, and ``a_0 marks`` with a point and its label for each mark on what that robot mapped:
+a slash is not allowed in their names. Each component is drawn in its own
 frame, so that several lie over each other: switch layers off.
 """
 
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
     from ezdxf.document import Drawing
 
 SUFFIX = ".dxf"
-WALL_COLOUR, FREE_COLOUR, PATH_COLOUR, ROBOT_COLOUR = 7, 9, 3, 1  # of AutoCAD's index
+WALL_COLOUR, FREE_COLOUR, PATH_COLOUR, ROBOT_COLOUR, MARK_COLOUR = 7, 9, 3, 1, 6  # AutoCAD's index
+LABEL_HEIGHT = 0.25  # [m]
 
 
 def write(some_map: RobotMap | JointMap, path: Path) -> None:
@@ -84,6 +86,11 @@ def _draw(drawing: Drawing, scene: Scene) -> None:
     for robot, (x, y, _) in scene.robots.items():
         start = _layer(drawing, f"robot {layer_name(robot)}", ROBOT_COLOUR)
         space.add_point((x, y), dxfattribs=start)
+    for mark in scene.marks:
+        layer = _layer(drawing, f"{layer_name(mark.component)} marks", MARK_COLOUR)
+        place = tuple(mark.position.tolist())
+        space.add_point(place, dxfattribs=layer)
+        space.add_text(mark.label, height=LABEL_HEIGHT, dxfattribs={**layer, "insert": place})
 
 
 def _layer(drawing: Drawing, name: str, colour: int) -> dict[str, str]:

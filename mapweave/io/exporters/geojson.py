@@ -12,6 +12,8 @@ One FeatureCollection; ``properties.kind`` tells what a feature is:
                scan                        [rad]: one number a position
 `robot`        Point: the origin of a      ``robot``, ``origin_of`` (its component, as ``a/0``) and
                robot's component           ``theta`` [rad], joint maps only
+`mark`         Point                       ``label``, ``by``, ``time`` [s since 1970], ``id`` and
+                                           ``marked_in`` (the robot's component, as ``a/0``)
 =============  ==========================  =========================================================
 
 Each has ``component``, in whose frame its coordinates are. GeoJSON presumes longitude and latitude
@@ -30,6 +32,7 @@ import numpy as np
 from mapweave.atomic import replace_file
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.maps import JointMap, RobotMap
+from mapweave.marks import PlacedMark
 from mapweave.pictures.scene import Scene, ScenePath, robot_of, scenes_of
 
 SUFFIX = ".geojson"
@@ -82,6 +85,7 @@ def _features(scene: Scene) -> list[Json]:
         *_polylines(scene),
         *(_trajectory(scene, path) for path in scene.paths),
         *(_robot(scene, name, pose) for name, pose in scene.robots.items() if joint),
+        *(_mark(scene, mark) for mark in scene.marks),
     ]
 
 
@@ -145,6 +149,12 @@ def _robot(scene: Scene, name: str, pose: FloatArray) -> Json:
     point = {"type": "Point", "coordinates": _positions(pose[:2])}
     theta = round(float(pose[2]), DECIMALS)
     return _feature(scene, "robot", point, robot=robot_of(name), origin_of=name, theta=theta)
+
+
+def _mark(scene: Scene, mark: PlacedMark) -> Json:
+    point = {"type": "Point", "coordinates": _positions(mark.position)}
+    said = {"label": mark.label, "by": mark.by, "time": mark.time, "id": mark.id}
+    return _feature(scene, "mark", point, **said, marked_in=mark.component)
 
 
 def _positions(points: FloatArray) -> list[Any]:

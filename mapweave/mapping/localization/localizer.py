@@ -270,6 +270,11 @@ class LocalizedMap(NamedTuple):
 
     map: RobotMap
 
+    @property
+    def submaps(self) -> tuple[Submap, ...]:
+        """All submaps where they are."""
+        return self.map.submaps
+
     def robot_map(self) -> RobotMap:
         """Return it."""
         return self.map

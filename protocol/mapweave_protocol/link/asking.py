@@ -5,14 +5,23 @@ from typing import TypeVar
 
 import zenoh
 
+from mapweave.maps import parse_component
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY
-from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
+from mapweave_protocol.wire.messages import (
+    JointMapMessage,
+    MapMessage,
+    OrderMessage,
+    OrdersMessage,
+    RunsMessage,
+)
 from mapweave_protocol.wire.model import Message
+from mapweave_protocol.wire.orders.runs_message import WireRun
 from mapweave_protocol.wire.queries import JointQuery
 
 ANSWER_WITHIN = 5.0  # [s]
+ALL_ORDERS = JointQuery(orders="all").parameters
 
 M = TypeVar("M", bound=Message)
 
@@ -63,6 +72,70 @@ def ask_robot_map(
     return max(answers, key=lambda message: message.version, default=None)
 
 
+def ask_map_of_component(
+    session: zenoh.Session, team: str, component: str, timeout: float = ANSWER_WITHIN
+) -> MapMessage | None:
+    """Return the map of the run that `component`, such as ``r1/0``, is of; None if none is known.
+
+    Raises
+    ------
+    MessageError
+        If the answer is not valid, or is another robot's map.
+    """
+    answers = _ask(session, team, JointQuery(component=component), MapMessage, timeout)
+    if any(message.robot != parse_component(component)[0] for message in answers):
+        raise MessageError(MapMessage.format, f"answer about another robot than of {component!r}")
+    return max(answers, key=lambda message: message.version, default=None)
+
+
+def ask_runs(
+    session: zenoh.Session, team: str, timeout: float = ANSWER_WITHIN
+) -> list[WireRun] | None:
+    """Return the runs that the coordinator holds, of all robots; None if nobody answers.
+
+    Raises
+    ------
+    MessageError
+        If the answer is not valid.
+    """
+    answers = _ask(session, team, JointQuery(runs="all"), RunsMessage, timeout)
+    return [run for message in answers for run in message.runs] if answers else None
+
+
+def ask_orders(
+    session: zenoh.Session, team: str, timeout: float = ANSWER_WITHIN
+) -> list[OrderMessage] | None:
+    """Return all orders that the coordinator holds; None if nobody answers.
+
+    Raises
+    ------
+    MessageError
+        If the answer is not valid.
+    """
+    answers = _ask(session, team, JointQuery(orders="all"), OrdersMessage, timeout)
+    return [order for message in answers for order in message.orders] if answers else None
+
+
+def request_orders_of(
+    session: zenoh.Session, team: str, robot: str, on_sample: Callable[[zenoh.Sample], None]
+) -> None:
+    """Ask `robot` for the orders that it holds.
+
+    Parameters
+    ----------
+    on_sample
+        Called in a thread of Zenoh's.
+    """
+    _request(session, f"{AGENT_QUERY.build(team=team, robot=robot)}?{ALL_ORDERS}", on_sample)
+
+
+def request_orders_of_coordinator(
+    session: zenoh.Session, team: str, on_sample: Callable[[zenoh.Sample], None]
+) -> None:
+    """Ask the coordinator for the orders that it holds; else as `request_orders_of`."""
+    _request(session, f"{JOINT_QUERY.build(team=team)}?{ALL_ORDERS}", on_sample)
+
+
 def request_all_of(
     session: zenoh.Session, team: str, robot: str, on_sample: Callable[[zenoh.Sample], None]
 ) -> None:
@@ -73,16 +146,26 @@ def request_all_of(
     on_sample
         Called in a thread of Zenoh's.
     """
+    # Zenoh says so by a parameter of its own, `_anyke`: not where we have some.
+    under_any = zenoh.ReplyKeyExpr.ANY
+    _request(session, AGENT_QUERY.build(team=team, robot=robot), on_sample, under_any)
 
+
+def _request(
+    session: zenoh.Session,
+    selector: str,
+    on_sample: Callable[[zenoh.Sample], None],
+    accepted: zenoh.ReplyKeyExpr = zenoh.ReplyKeyExpr.MATCHING_QUERY,
+) -> None:
     def take(reply: zenoh.Reply) -> None:
         if reply.ok:
             on_sample(reply.ok)
 
     session.get(
-        AGENT_QUERY.build(team=team, robot=robot),
+        selector,
         take,
         consolidation=zenoh.ConsolidationMode.NONE,
-        accept_replies=zenoh.ReplyKeyExpr.ANY,
+        accept_replies=accepted,
         timeout=ANSWER_WITHIN,
     )
 

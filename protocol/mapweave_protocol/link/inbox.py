@@ -13,12 +13,16 @@ from mapweave.errors import MapweaveError
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.keys import (
+    AGENT_QUERY,
     ALIGNMENT,
     COORDINATOR_LIVE,
     JOINT_MAP,
+    JOINT_QUERY,
     JOINT_STATUS,
     LIVE,
     MAP,
+    MARK,
+    ORDER,
     POSE,
     STATUS,
     KeyFormat,
@@ -28,6 +32,9 @@ from mapweave_protocol.wire.messages import (
     JointMapMessage,
     JointStatusMessage,
     MapMessage,
+    MarksMessage,
+    OrderMessage,
+    OrdersMessage,
     PoseMessage,
     StatusMessage,
 )
@@ -175,9 +182,11 @@ def check_origin(message: Message, parts: Mapping[str, str]) -> None:
     Raises
     ------
     MessageError
-        If a robot's id differs.
+        If the id of a robot or an operator differs, or what kind of order it is.
     """
     said = message.model_dump(include={"robot"})
+    if isinstance(message, OrderMessage):
+        said = {"name": message.by, "order": str(message.kind)}
     if isinstance(message, AlignmentMessage):
         said |= {"reference": message.reference.robot, "other": message.other.robot}
     for name, robot in said.items():
@@ -190,6 +199,26 @@ def check_origin(message: Message, parts: Mapping[str, str]) -> None:
 def map_reader() -> Reader[MapMessage]:
     """Return a reader of robot maps."""
     return Reader(MapMessage, MAP)
+
+
+def marks_reader() -> Reader[MarksMessage]:
+    """Return a reader of the marks of robots."""
+    return Reader(MarksMessage, MARK)
+
+
+def order_reader() -> Reader[OrderMessage]:
+    """Return a reader of operators' orders."""
+    return Reader(OrderMessage, ORDER)
+
+
+def held_orders_reader() -> Reader[OrdersMessage]:
+    """Return a reader of what agents answer that were asked for all orders they hold."""
+    return Reader(OrdersMessage, AGENT_QUERY)
+
+
+def coordinators_orders_reader() -> Reader[OrdersMessage]:
+    """Return a reader of what the coordinator answers that was asked for them."""
+    return Reader(OrdersMessage, JOINT_QUERY)
 
 
 def pose_reader() -> Reader[PoseMessage]:

@@ -170,6 +170,11 @@ def declare_alignment_publisher(session: zenoh.Session, key: str) -> ze.Advanced
     return _declare_publisher(session, key, 2)
 
 
+def declare_marks_publisher(session: zenoh.Session, key: str) -> ze.AdvancedPublisher:
+    """Return a publisher of a robot's marks: those of its last runs."""
+    return _declare_publisher(session, key, 16)
+
+
 def declare_joint_publisher(session: zenoh.Session, key: str) -> ze.AdvancedPublisher:
     """Return a publisher of joint maps; older versions than it caches come from the store."""
     return _declare_publisher(session, key, 16)

@@ -7,6 +7,7 @@ from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.narration.story_alignments import AlignmentStory
 from mapweave_protocol.narration.story_joint import JointStory
+from mapweave_protocol.narration.story_said import SaidStory
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, StatusMessage
 from mapweave_protocol.wire.pairs import is_earlier_run
 
@@ -64,6 +65,7 @@ class Story:
         self.robots: dict[str, RobotState] = {}
         self._alignments = AlignmentStory()
         self._joint = JointStory()
+        self._said = SaidStory()
         self._coordinators = Claimants()
 
     @property
@@ -131,6 +133,7 @@ class Story:
         """Tell what is new about the joint map, and each join that it is the first not to use."""
         yield from self._joint.changed(joint)
         yield from self._alignments.judged(joint)
+        yield from self._said.changed(joint)
 
     def _past(self, compared: MapVersion) -> set[str]:
         """Return the parts of a robot that became one with others since they were compared."""

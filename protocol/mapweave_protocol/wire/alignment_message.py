@@ -171,7 +171,7 @@ class AlignmentMessage(Message):
         One for each pair of components, its `reference` of the robot `reference`.
     """
 
-    kind: ClassVar[bytes] = b"a"
+    letter: ClassVar[bytes] = b"a"
     format: ClassVar[str] = "alignment"
 
     robot: Id

@@ -42,7 +42,7 @@ def encode(message: Message) -> bytes:
     packer = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=DICTIONARY)
     deflated = packer.compress(body) + packer.flush()
     smaller = len(deflated) < len(body)
-    head = MAGIC + bytes([VERSION]) + message.kind + (DEFLATED if smaller else PLAIN)
+    head = MAGIC + bytes([VERSION]) + message.letter + (DEFLATED if smaller else PLAIN)
     payload = head + (deflated if smaller else body)
     if len(payload) > MAX_PAYLOAD or len(body) > MAX_BODY:
         raise MessageError(message.format, f"{len(payload)} bytes, expected at most {MAX_PAYLOAD}")
@@ -85,9 +85,9 @@ def _check_head(kind: type[Message], payload: bytes) -> None:
         raise MessageError(kind.format, f"expected it to begin with {MAGIC.decode()}")
     if payload[2] != VERSION:
         raise MessageError(kind.format, f"version {payload[2]} of the wire, expected {VERSION}")
-    if payload[3:4] != kind.kind:
+    if payload[3:4] != kind.letter:
         raise MessageError(
-            kind.format, f"found kind {payload[3:4]!r}, expected {kind.kind.decode()!r}"
+            kind.format, f"found kind {payload[3:4]!r}, expected {kind.letter.decode()!r}"
         )
 
 

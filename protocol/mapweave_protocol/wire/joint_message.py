@@ -24,6 +24,8 @@ from mapweave_protocol.wire.model import (
     WireModel,
     to_transform,
 )
+from mapweave_protocol.wire.orders.marks_message import WirePlacedMark
+from mapweave_protocol.wire.orders.order_message import MAX_ORDERS, WireOrder
 
 
 class WireComponent(WireModel):
@@ -45,6 +47,7 @@ class WireComponent(WireModel):
     robots: dict[ComponentName, JointTransform] = Field(min_length=1, max_length=MAX_ALIGNMENTS)
     confidence: Probability
     stream: bytes = Field(max_length=MAX_BYTES)
+    marks: tuple[WirePlacedMark, ...] = Field(default=(), max_length=MAX_ALIGNMENTS)
     before: ComponentName | None = None
 
     @classmethod
@@ -52,16 +55,21 @@ class WireComponent(WireModel):
         """Return `component` for the wire."""
         lines = PackedLines.pack(component.map, JOINT_REACH, component.segment_confidence)
         robots = {name: to_transform(pose) for name, pose in component.robots.items()}
-        return cls.of_lines(robots, round(float(component.confidence), 4), lines)
+        marks = tuple(WirePlacedMark.pack(mark) for mark in component.marks)
+        return cls.of_lines(robots, round(float(component.confidence), 4), lines, marks)
 
     @classmethod
     def of_lines(
-        cls, robots: dict[str, JointTransform], confidence: float, lines: PackedLines
+        cls,
+        robots: dict[str, JointTransform],
+        confidence: float,
+        lines: PackedLines,
+        marks: tuple[WirePlacedMark, ...],
     ) -> Self:
         """Return the component of these lines, whole."""
         encoder = Encoder()
         PackedLines.code(encoder, lines, confident=True)
-        return cls(robots=robots, confidence=confidence, stream=encoder.finish())
+        return cls(robots=robots, confidence=confidence, stream=encoder.finish(), marks=marks)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -91,7 +99,7 @@ class WireComponent(WireModel):
             If its stream is damaged.
         """
         lines = PackedLines.code_changes(Decoder(self.stream), before.lines, None)
-        return self.of_lines(self.robots, self.confidence, lines)
+        return self.of_lines(self.robots, self.confidence, lines, self.marks)
 
     def unpack(self) -> JointComponent:
         """Return the component.
@@ -109,6 +117,7 @@ class WireComponent(WireModel):
             confidence=self.confidence,
             map=self.lines.unpack(JOINT_REACH),
             segment_confidence=certainties / CERTAINTIES,
+            marks=tuple(mark.unpack() for mark in self.marks),
         )
 
 
@@ -129,13 +138,14 @@ class JointMapMessage(Message):
         Of which components alignments are no longer there.
     """
 
-    kind: ClassVar[bytes] = b"j"
+    letter: ClassVar[bytes] = b"j"
     format: ClassVar[str] = "joint map"
 
     series: Id
     version: int = Field(ge=1, le=2**53)
     components: tuple[WireComponent, ...] = Field(max_length=MAX_ALIGNMENTS)
     alignments: tuple[WireAlignment, ...] = Field(max_length=MAX_ALIGNMENTS)
+    orders: tuple[WireOrder, ...] = Field(default=(), max_length=MAX_ORDERS)
     changes: bool = False
     gone: tuple[tuple[ComponentName, ComponentName], ...] = Field(
         default=(), max_length=MAX_ALIGNMENTS
@@ -149,6 +159,7 @@ class JointMapMessage(Message):
             version=joint.version,
             components=tuple(WireComponent.pack(component) for component in joint.components),
             alignments=tuple(WireAlignment.pack(alignment) for alignment in joint.alignments),
+            orders=tuple(WireOrder.pack(order) for order in joint.orders),
         )
 
     @model_validator(mode="after")
@@ -172,6 +183,7 @@ class JointMapMessage(Message):
             version=self.version,
             components=tuple(_since(component, before.components) for component in self.components),
             alignments=tuple(a for names, a in now.items() if told.get(names) != a),
+            orders=self.orders,
             changes=True,
             gone=tuple(names for names in told if names not in now),
         )
@@ -192,6 +204,7 @@ class JointMapMessage(Message):
                 version=self.version,
                 components=tuple(_over(c, before.components) for c in self.components),
                 alignments=tuple(a for names, a in alignments.items() if names not in self.gone),
+                orders=self.orders,
             )
         except ValueError as error:
             raise MessageError(self.format, f"version {self.version}: {error}") from error
@@ -210,6 +223,7 @@ class JointMapMessage(Message):
             self.version,
             tuple(component.unpack() for component in self.components),
             tuple(alignment.unpack() for alignment in self.alignments),
+            orders=tuple(order.unpack() for order in self.orders),
         )
 
     def follows(self, before: Self) -> bool:

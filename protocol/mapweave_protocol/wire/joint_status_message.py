@@ -17,6 +17,7 @@ from mapweave_protocol.wire.model import (
     WireModel,
     to_transform,
 )
+from mapweave_protocol.wire.orders.order_message import DIGEST_SIZE
 from mapweave_protocol.wire.status_message import MAX_PEERS
 
 
@@ -54,9 +55,13 @@ class JointStatusMessage(Message):
         For each pair of robots whose alignments are held, of which states of the maps.
     frames
         Where each component of the latest version is: enough to say where a robot is in it.
+    marks
+        Which version of the marks of each run that made some is held.
+    orders
+        Tells apart which orders of operators are held; nothing where none are.
     """
 
-    kind: ClassVar[bytes] = b"c"
+    letter: ClassVar[bytes] = b"c"
     format: ClassVar[str] = "coordinator status"
 
     boot: Id
@@ -69,6 +74,8 @@ class JointStatusMessage(Message):
         default=(), max_length=MAX_ALIGNMENTS
     )
     frames: dict[ComponentName, Place] = Field(default_factory=dict, max_length=MAX_ALIGNMENTS)
+    marks: tuple[MapVersion, ...] = Field(default=(), max_length=MAX_PEERS)
+    orders: bytes = Field(default=b"", max_length=DIGEST_SIZE)
 
 
 def frames_of(joint: JointMap | None) -> dict[str, Place]:

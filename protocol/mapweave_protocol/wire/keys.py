@@ -74,6 +74,7 @@ class KeyFormat:
 
 
 MAP = KeyFormat("mapweave/v2/{team}/agent/{robot}/map")
+MARK = KeyFormat("mapweave/v2/{team}/agent/{robot}/mark")
 POSE = KeyFormat("mapweave/v2/{team}/agent/{robot}/pose")
 STATUS = KeyFormat("mapweave/v2/{team}/agent/{robot}/status")
 ALIGNMENT = KeyFormat("mapweave/v2/{team}/agent/{robot}/alignment/{reference}/{other}")
@@ -81,6 +82,7 @@ JOINT_MAP = KeyFormat("mapweave/v2/{team}/joint/map")
 JOINT_QUERY = KeyFormat("mapweave/v2/{team}/joint/query")
 JOINT_STATUS = KeyFormat("mapweave/v2/{team}/joint/status")
 AGENT_QUERY = KeyFormat("mapweave/v2/{team}/agent/{robot}/query")
+ORDER = KeyFormat("mapweave/v2/{team}/operator/{name}/{order}")
 COORDINATOR_LIVE = KeyFormat("mapweave/v2/{team}/live/coordinator/{boot}")
 LIVE = KeyFormat("mapweave/v2/{team}/live/agent/{robot}/{boot}")
 

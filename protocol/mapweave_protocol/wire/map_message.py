@@ -133,7 +133,7 @@ class MapMessage(Message):
         The `Changes`.
     """
 
-    kind: ClassVar[bytes] = b"m"
+    letter: ClassVar[bytes] = b"m"
     format: ClassVar[str] = "map"
 
     robot: Id

@@ -8,6 +8,9 @@ from mapweave_protocol.wire.alignment_message import AlignmentMessage, MapVersio
 from mapweave_protocol.wire.joint_message import JointMapMessage
 from mapweave_protocol.wire.joint_status_message import JointStatusMessage
 from mapweave_protocol.wire.map_message import MapMessage
+from mapweave_protocol.wire.orders.marks_message import MarksMessage
+from mapweave_protocol.wire.orders.order_message import OrderMessage, OrdersMessage
+from mapweave_protocol.wire.orders.runs_message import RunsMessage
 from mapweave_protocol.wire.pose_message import PoseMessage
 from mapweave_protocol.wire.status_message import Compared, StatusMessage, Traffic
 
@@ -18,7 +21,11 @@ __all__ = [
     "JointStatusMessage",
     "MapMessage",
     "MapVersion",
+    "MarksMessage",
+    "OrderMessage",
+    "OrdersMessage",
     "PoseMessage",
+    "RunsMessage",
     "StatusMessage",
     "Traffic",
 ]

@@ -68,9 +68,9 @@ class WireModel(BaseModel):
 
 
 class Message(WireModel):
-    """A message; `kind` tells on the wire which, `format` in words."""
+    """A message; `letter` tells on the wire which, `format` in words."""
 
-    kind: ClassVar[bytes]
+    letter: ClassVar[bytes]
     format: ClassVar[str]
 
 

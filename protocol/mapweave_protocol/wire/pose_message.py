@@ -69,7 +69,7 @@ class PoseMessage(Message):
         The same in the joint frame; None while the joint map does not have the component.
     """
 
-    kind: ClassVar[bytes] = b"p"
+    letter: ClassVar[bytes] = b"p"
     format: ClassVar[str] = "pose"
 
     robot: Id

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from mapweave_protocol.wire.alignment_message import MapVersion
 from mapweave_protocol.wire.model import Count, Id, Label, Message, Number, WireModel
+from mapweave_protocol.wire.orders.order_message import DIGEST_SIZE
 
 MAX_PEERS = 1024
 
@@ -43,10 +44,12 @@ class StatusMessage(Message):
     holds
         Which state of each peer's map is held.
     sent
-        By kind of message: ``map``, ``alignment``, ``pose``, ``status``.
+        By kind of message: ``map``, ``alignment``, ``pose``, ``mark``, ``status``.
+    orders
+        Tells apart which orders of operators are held; nothing where none are.
     """
 
-    kind: ClassVar[bytes] = b"s"
+    letter: ClassVar[bytes] = b"s"
     format: ClassVar[str] = "status"
 
     robot: Id
@@ -64,3 +67,4 @@ class StatusMessage(Message):
     compared: dict[Id, Compared] = Field(default_factory=dict, max_length=MAX_PEERS)
     holds: tuple[MapVersion, ...] = Field(default=(), max_length=MAX_PEERS)
     sent: dict[Label, Traffic] = Field(default_factory=dict, max_length=16)
+    orders: bytes = Field(default=b"", max_length=DIGEST_SIZE)

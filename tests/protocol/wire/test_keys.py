@@ -9,9 +9,10 @@ from mapweave_protocol.wire.pairs import ordered, responsible
 
 FORMATS = [
     keys.MAP, keys.STATUS, keys.ALIGNMENT, keys.AGENT_QUERY, keys.JOINT_MAP, keys.JOINT_STATUS,
-    keys.JOINT_QUERY, keys.LIVE, keys.COORDINATOR_LIVE,
+    keys.JOINT_QUERY, keys.LIVE, keys.COORDINATOR_LIVE, keys.MARK, keys.ORDER,
 ]  # fmt: skip
 EXAMPLE = {"team": "rescue", "robot": "r1", "reference": "r1", "other": "r2", "boot": "0af3"}
+EXAMPLE |= {"name": "anna", "order": "pin"}
 
 
 def parts_of(keys_of: KeyFormat) -> dict[str, str]:

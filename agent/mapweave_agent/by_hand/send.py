@@ -1,0 +1,114 @@
+"""``mapweave send``: a finished map becomes a robot's run in a team."""
+
+import argparse
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+
+import zenoh
+
+from mapweave.cli import Command, add_config_argument, config_of
+from mapweave.commands.progress import track
+from mapweave.errors import FileError, MapweaveError
+from mapweave.fusion.align import FusionParameters, align
+from mapweave.ids import check_id, is_id
+from mapweave.io.map_files import read_map
+from mapweave.maps import Alignment, RobotMap, component_name
+from mapweave.text import percent
+from mapweave_agent.by_hand.delivery import Delivery
+from mapweave_agent.past_runs import numbered_from
+from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.asking import ask_map_of_component, ask_runs
+from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.link.session import open_session
+from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
+from mapweave_protocol.wire.orders.runs_message import WireRun
+from mapweave_protocol.wire.pairs import ordered
+
+PATIENCE = 10.0  # [s] for a router
+UNNAMED = "0"  # the boot of a map that was made of a file
+
+
+def _configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("map", metavar="MAP.json", type=Path, help="a robot's map")
+    parser.add_argument(
+        "--robot", metavar="ID", help="as whose run it is delivered (default as the map says)"
+    )
+    add_connection_arguments(parser)
+    add_config_argument(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    robot_map = read_map(options.map)
+    if not robot_map.submaps:
+        raise FileError(options.map, "nothing is mapped in it; expected a submap or more")
+    robot = check_id("robot", options.robot or robot_map.robot)
+    boot = _boot(options.map, robot_map)
+    team, endpoints = connection_of(options)
+    parameters = FusionParameters.of(config_of(options))
+    with open_session(endpoints, patience=PATIENCE) as session:
+        runs = ask_runs(session, team)
+        if runs is None:
+            raise MapweaveError(f"no coordinator of team {team} answers; is one running?")
+        own = numbered(replace(robot_map, robot=robot, boot=boot), runs)
+        with Delivery(session, team, own) as delivery:
+            delivery.map()
+            print(f"delivered: {_named(own)}, run {boot}")  # noqa: T201
+            others = [run for run in runs if (run.robot, run.boot) != (robot, boot)]
+            for run in track(others, "comparing", len(others)):
+                message = _compared(session, team, own, run, parameters)
+                if message is not None:
+                    delivery.alignments(message)
+                    _tell(message.unpack())
+    return 0
+
+
+def numbered(own: RobotMap, runs: list[WireRun]) -> RobotMap:
+    """Return a map with its components numbered above those of the robot's other runs.
+
+    One that was delivered before keeps the numbers that it has.
+    """
+    of_robot = [run for run in runs if run.robot == own.robot]
+    least = min(own.components)
+    held = next((run for run in of_robot if run.boot == own.boot), None)
+    if held is not None and held.components:
+        return numbered_from(own, min(held.components) - least)
+    first = max((c + 1 for run in of_robot for c in run.components), default=0)
+    return numbered_from(own, max(first - least, 0))
+
+
+def _boot(path: Path, robot_map: RobotMap) -> str:
+    """Return the name of the run: of a map made of a file, what tells its content apart."""
+    if robot_map.boot != UNNAMED and is_id(robot_map.boot):
+        return robot_map.boot
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+
+def _compared(
+    session: zenoh.Session, team: str, own: RobotMap, run: WireRun, parameters: FusionParameters
+) -> AlignmentMessage | None:
+    """Return how the map lies to that of another run; None where that is not there any more."""
+    if not run.components:
+        return None
+    name = component_name(run.robot, max(run.components))
+    message = ask_map_of_component(session, team, name)
+    other = None if message is None else MapAssembler().update(message)
+    if other is None:
+        return None
+    first, _ = ordered(own.robot, other.robot)
+    pair = (own, other) if own.robot == first else (other, own)
+    found = align(*pair, parameters)
+    return AlignmentMessage.pack(own.robot, MapVersion.of(pair[0]), MapVersion.of(pair[1]), found)
+
+
+def _tell(found: tuple[Alignment, ...]) -> None:
+    for a in found:
+        sure = percent(a.confidence)
+        print(f"{a.reference} - {a.other}: {a.decision} ({sure}): {a.reason}")  # noqa: T201
+
+
+def _named(own: RobotMap) -> str:
+    return ", ".join(component_name(own.robot, component) for component in own.components)
+
+
+command = Command("Deliver a finished map to a team, as a robot's run.", _configure, _run)

@@ -1,0 +1,1 @@
+"""What people have said of a map, carried into the joint one."""

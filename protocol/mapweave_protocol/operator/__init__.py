@@ -1,0 +1,1 @@
+"""What a person orders by hand: how orders are made, delivered and taken back."""

@@ -1,0 +1,124 @@
+"""What the commands of operators have in common."""
+
+import argparse
+import getpass
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import zenoh
+
+from mapweave.errors import MapweaveError
+from mapweave.geometry.arrays import FloatArray
+from mapweave.ids import check_id
+from mapweave.maps import parse_component
+from mapweave.orders import MAX_REASON
+from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.session import open_session
+from mapweave_protocol.operator.delivery import PATIENCE
+
+NAME_VARIABLE = "MAPWEAVE_OPERATOR"
+_NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{0,9})?"
+
+
+def add_order_arguments(parser: argparse.ArgumentParser, taken_back: str) -> None:
+    """Add ``--as``, ``--undo`` and those of the connection.
+
+    Parameters
+    ----------
+    taken_back
+        What ``--undo`` takes back, in words.
+    """
+    parser.add_argument(
+        "--as",
+        dest="name",
+        metavar="NAME",
+        help=f"who orders it (default ${NAME_VARIABLE} or the login name)",
+    )
+    parser.add_argument("--undo", action="store_true", help=f"take back {taken_back}")
+    add_connection_arguments(parser)
+
+
+def add_reason_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--reason``."""
+    parser.add_argument(
+        "--reason", required=True, type=_reason, metavar="TEXT", help="why; the joint map says so"
+    )
+
+
+def operator_of(options: argparse.Namespace) -> str:
+    """Return the operator's name.
+
+    Raises
+    ------
+    InvalidIdError
+        If it is no id.
+    """
+    given = options.name or os.environ.get(NAME_VARIABLE) or getpass.getuser().lower()
+    return check_id("operator", given)
+
+
+@contextmanager
+def connected(options: argparse.Namespace) -> Iterator[tuple[zenoh.Session, str]]:
+    """Give a session, and the team.
+
+    Raises
+    ------
+    UnreachableError
+        If no router answers for some seconds.
+    """
+    team, endpoints = connection_of(options)
+    with open_session(endpoints, patience=PATIENCE) as session:
+        yield session, team
+
+
+def component(text: str) -> str:
+    """Return the name of a component that `text` is.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    try:
+        check_id("robot", parse_component(text)[0])
+    except MapweaveError as error:
+        raise ValueError(str(error)) from error
+    return text
+
+
+def transform(text: str) -> FloatArray:
+    """Return the (3,) transform [m, m, rad] that `text` gives in metres and degrees.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    if not re.fullmatch(f"{_NUMBER},{_NUMBER},{_NUMBER}", text):
+        raise ValueError(f"{text}: expected x,y,degrees [m, m, °], such as 3.5,-1,90")
+    x, y, degrees = (float(number) for number in text.split(","))
+    return np.array([x, y, np.radians(degrees)])
+
+
+def scan_or_place(text: str) -> int | FloatArray:
+    """Return the number of a scan, or the (2,) place [m] that `text` gives.
+
+    Raises
+    ------
+    ValueError
+        If it is neither.
+    """
+    if re.fullmatch(r"[0-9]{1,15}", text):
+        return int(text)
+    if not re.fullmatch(f"{_NUMBER},{_NUMBER}", text):
+        raise ValueError(f"{text}: expected the number of a scan, or x,y [m], such as 3.5,-1")
+    return np.array([float(number) for number in text.split(",")])
+
+
+def _reason(text: str) -> str:
+    if not (text.isprintable() and text.strip() and len(text) <= MAX_REASON):
+        raise argparse.ArgumentTypeError(f"expected 1 to {MAX_REASON} printable characters")
+    return text

@@ -1,0 +1,1 @@
+"""What people and programs say of a map beside what was seen: marks and orders."""
