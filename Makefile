@@ -77,7 +77,7 @@ bench: $(KERNELS)
 
 .PHONY: bench-wire
 bench-wire: $(KERNELS)
-	$(BIN)/python -m benchmarks radio
+	$(BIN)/python -m benchmarks wire
 
 .PHONY: docs
 docs: $(KERNELS)
