@@ -24,6 +24,7 @@ from benchmarks import (
     usual_counts,
     wire,
 )
+from benchmarks.faults import kills, lossy, outages
 from benchmarks.speed import command as speed
 
 
@@ -55,6 +56,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     "confidence": fit_confidence,
     "wire": wire,
     "usual-counts": usual_counts,
+    "outages": outages,
+    "kills": kills,
+    "lossy": lossy,
     "page": page,
     "mutations": mutations,
 }

@@ -60,7 +60,7 @@ class Outbox:
         self._boot = boot
         self._sender = sender
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
-        self._found: dict[tuple[str, str], AlignmentMessage] = {}
+        self._found: dict[frozenset[Run], AlignmentMessage] = {}
         self._marked: dict[str, MarksMessage] = {}
         self._messages = Counter(dict.fromkeys(KINDS, 0))
         self._bytes = Counter(dict.fromkeys(KINDS, 0))
@@ -106,7 +106,7 @@ class Outbox:
 
     @property
     def found(self) -> Iterable[AlignmentMessage]:
-        """What was published last of each pair of robots."""
+        """What was published last of each pair of runs."""
         return self._found.values()
 
     def send_map(self, robot_map: RobotMap, *, complete: bool) -> tuple[RobotMap, int]:
@@ -137,7 +137,7 @@ class Outbox:
         if publisher is None:
             publisher = declare_alignment_publisher(self._session, self._key_of(message))
             self._alignments[pair] = self._declared.enter_context(publisher)
-        self._found[pair] = message
+        self._found[frozenset(states_of((message.reference, message.other)))] = message
         self._put("alignment", publisher, encode(message))
 
     def send_news(self, message: AlignmentMessage, *, final: bool) -> None:
@@ -148,8 +148,8 @@ class Outbox:
         final
             Whether it is the last: then any difference counts.
         """
-        told = self._found.get((message.reference.robot, message.other.robot))
-        if told is not None and _runs(told) == _runs(message):
+        told = self._found.get(frozenset(states_of((message.reference, message.other))))
+        if told is not None:
             same = told.alignments == message.alignments
             if same or not (final or is_news(message.unpack(), told.unpack())):
                 return
@@ -196,7 +196,3 @@ class Outbox:
         publisher.put(payload)
         self._messages[kind] += 1
         self._bytes[kind] += len(payload)
-
-
-def _runs(message: AlignmentMessage) -> set[Run]:
-    return set(states_of((message.reference, message.other)))

@@ -20,6 +20,12 @@ class AgentParameters(BaseModel):
     map_interval: float = Field(
         2.0, gt=0, description="[s] at most this often the growing submap is published, if driven"
     )
+    state_interval: float = Field(
+        1.5, gt=0, description="[s] at least this often the growing map is kept on disk"
+    )
+    leave_within: float = Field(
+        3.0, ge=0, description="[s] that a coordinator is given to take the last map"
+    )
     comparison_interval: float = Field(
         5.0, ge=0, description="[s] at most this often a pair is compared while it still maps"
     )
@@ -33,10 +39,10 @@ class AgentParameters(BaseModel):
         10.0, gt=0, description="[s] after which it is published though less was driven"
     )
     bytes_per_metre: float = Field(
-        100.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
+        70.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
     )
     bytes_per_second: float = Field(
-        5.0,
+        2.0,
         ge=0,
         description="[1/s] of maps besides: a place may change while it stands",
     )
@@ -91,6 +97,22 @@ class PublicationSchedule:
         self._last = now
         self._driven = 0.0
         self._urgent = False
+
+
+class RegularSchedule:
+    """When to do what is to be done at a bounded rate."""
+
+    def __init__(self, interval: float) -> None:
+        self._interval = interval
+        self._last = -math.inf
+
+    def due(self, now: float) -> bool:
+        """Tell whether it is time."""
+        return now - self._last >= self._interval
+
+    def done(self, now: float) -> None:
+        """Note that it was done."""
+        self._last = now
 
 
 class StatusSchedule:

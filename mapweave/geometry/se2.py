@@ -4,6 +4,9 @@ A pose or transform is ``[x, y, theta]``: metres and radians. As a transform it 
 in its own frame to coordinates in the parent's. Every function broadcasts over leading axes.
 """
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -32,6 +35,8 @@ def compose(first: ArrayLike, second: ArrayLike) -> FloatArray:
     Both are ``(..., 3)`` [m, m, rad]; so is the result, its angle in (-pi, pi].
     """
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    if a.ndim == b.ndim == 1:
+        return _compose_two(a.tolist(), b.tolist())
     c, s = np.cos(a[..., 2]), np.sin(a[..., 2])
     x = a[..., 0] + c * b[..., 0] - s * b[..., 1]
     y = a[..., 1] + s * b[..., 0] + c * b[..., 1]
@@ -41,9 +46,28 @@ def compose(first: ArrayLike, second: ArrayLike) -> FloatArray:
 def inverse(pose: ArrayLike) -> FloatArray:
     """Return the ``(..., 3)`` inverse of `pose`."""
     p = np.asarray(pose, dtype=float)
+    if p.ndim == 1:
+        return _inverse_of_one(*p.tolist())
     c, s = np.cos(p[..., 2]), np.sin(p[..., 2])
     x, y = -c * p[..., 0] - s * p[..., 1], s * p[..., 0] - c * p[..., 1]
     return _pose(x, y, wrap(-p[..., 2]))
+
+
+def _compose_two(first: Sequence[float], second: Sequence[float]) -> FloatArray:
+    """`compose` of one pose and another, in plain floats: what a tracker does all the time."""
+    (ax, ay, at), (bx, by, bt) = first, second
+    c, s = math.cos(at), math.sin(at)
+    return np.array([ax + c * bx - s * by, ay + s * bx + c * by, _wrapped(at + bt)])
+
+
+def _inverse_of_one(x: float, y: float, theta: float) -> FloatArray:
+    """`inverse` of one pose, in plain floats."""
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([-c * x - s * y, s * x - c * y, _wrapped(-theta)])
+
+
+def _wrapped(angle: float) -> float:
+    return math.pi - (math.pi - angle) % (2 * math.pi)
 
 
 def between(origin: ArrayLike, target: ArrayLike) -> FloatArray:

@@ -13,6 +13,7 @@
 #include "point_map.hpp"
 #include "polygons.hpp"
 #include "polylines.hpp"
+#include "pose_evidence.hpp"
 #include "proposals.hpp"
 #include "raster_icp.hpp"
 #include "rasters.hpp"
@@ -45,5 +46,6 @@ NB_MODULE(_compiled, m) {
   bind_segmentation(m);
   bind_slivers(m);
   bind_viewpoints(m);
+  bind_pose_evidence(m);  // of the points and viewpoints above
   bind_windows(m);
 }

@@ -32,6 +32,11 @@ struct Known {
   int64_t seen;  // block in which it was seen last; -1 once it is forgotten
 };
 
+// What is in sight: all up to `near` [m]; up to `far` what faces the sensor, by a cosine.
+struct Sight {
+  double near, far, facing;
+};
+
 struct Settings {
   double start_scale, end_scale, shrink, converged, noise;
   int max_iterations;
@@ -127,9 +132,12 @@ class PointMap {
     for (Point& point : fresh) {  // afterwards: a block's own points do not thin each other
       point.number = first_ + static_cast<int64_t>(known_.size());
       reach_out(point.x, point.y);
-      cells_[cell_of(point.x, point.y)].push_back(point);
+      std::vector<Point>& here = cells_[cell_of(point.x, point.y)];
+      if (here.empty()) tell_around(index(point.x) - left_, index(point.y) - low_);
+      here.push_back(point);
       known_.push_back({point.x, point.y, point.nx, point.ny, block_});
       seen_in_.back().push_back(point.number);
+      sample(point.number);
       ++count_;
     }
     ++block_;
@@ -163,14 +171,17 @@ class PointMap {
       const double* pose = poses.data() + 3 * j;
       const double c = std::cos(pose[2]), s = std::sin(pose[2]);
       for (size_t i = 0; i < n; ++i) {
-        const double* p = points.data() + 2 * i;
-        const double* m = normals.data() + 2 * i;
-        const double x = pose[0] + c * p[0] - s * p[1], y = pose[1] + s * p[0] + c * p[1];
-        const double u = weight_ * (c * m[0] - s * m[1]), v = weight_ * (s * m[0] + c * m[1]);
-        out[j * n + i] = any_within(x, y, u, v, reach);
+        out[j * n + i] = explains_one(points.data() + 2 * i, normals.data() + 2 * i, pose, c, s, reach);
       }
     }
     return Out<bool>(out, {k, n}, owner);
+  }
+
+  // Whether a point p with its normal m, moved to a pose, has a partner within reach; c and s are those of its turn.
+  bool explains_one(const double* p, const double* m, const double* pose, double c, double s, double reach) const {
+    const double x = pose[0] + c * p[0] - s * p[1], y = pose[1] + s * p[0] + c * p[1];
+    const double u = weight_ * (c * m[0] - s * m[1]), v = weight_ * (s * m[0] + c * m[1]);
+    return any_within(x, y, u, v, reach);
   }
 
   // Which (k,) starts were not dropped, the poses (k, 3) where the points come to lie from them, and what
@@ -233,38 +244,71 @@ class PointMap {
     if (every < 1 || clear.shape(0) < 1) throw std::invalid_argument("every: 1 or more, clear: a beam or more expected");
     const sectors::Beams beams(clear.data(), static_cast<int64_t>(clear.shape(0)), first, spacing, clearance);
     std::vector<double> shares(k, 0.0);
-    for (size_t j = 0; j < k; ++j) {
-      const double* pose = poses.data() + 3 * j;
-      const double c = std::cos(pose[2]), s = std::sin(pose[2]);
-      int64_t in_sight = 0, through = 0;
-      for (size_t i = static_cast<size_t>((every - first_ % every) % every); i < known_.size();
-           i += static_cast<size_t>(every)) {
-        const Known& q = known_[i];
-        if (q.seen < 0) continue;
-        const double dx = q.x - pose[0], dy = q.y - pose[1];
-        const double squared = dx * dx + dy * dy;
-        if (squared >= sight * sight) {
-          if (squared >= far_sight * far_sight) continue;
-          const double ahead = -(dx * q.nx + dy * q.ny);
-          if (!(ahead > 0 && ahead * ahead > facing * facing * squared)) continue;
-        }
-        ++in_sight;
-        if (beams.before(c * dx + s * dy, c * dy - s * dx, squared)) ++through;
-      }
-      if (in_sight) shares[j] = static_cast<double>(through) / static_cast<double>(in_sight);
-    }
+    for (size_t j = 0; j < k; ++j) shares[j] = share_seen_through(beams, poses.data() + 3 * j, {sight, far_sight, facing}, every);
     return give(std::move(shares), {k});
   }
 
   PointMap copy() const { return *this; }
 
  private:
+  // Of the points in sight from a pose, the share that lies before what the beams hit.
+  double share_seen_through(const sectors::Beams& beams, const double* pose, const Sight& sight, int64_t every) const {
+    const double c = std::cos(pose[2]), s = std::sin(pose[2]);
+    const double near = sight.near * sight.near, far = sight.far * sight.far, facing = sight.facing * sight.facing;
+    int64_t in_sight = 0, through = 0;
+    for (const Known& q : sampled(every)) {
+      const double dx = q.x - pose[0], dy = q.y - pose[1];
+      const double squared = dx * dx + dy * dy;
+      if (squared >= near) {
+        if (squared >= far) continue;
+        const double ahead = -(dx * q.nx + dy * q.ny);
+        if (!(ahead > 0 && ahead * ahead > facing * squared)) continue;
+      }
+      ++in_sight;
+      if (beams.before(c * dx + s * dy, c * dy - s * dx, squared)) ++through;
+    }
+    if (!in_sight) return 0.0;
+    return static_cast<double>(through) / static_cast<double>(in_sight);
+  }
+
   double weight_, cell_, thin_;
   int64_t blocks_, block_ = 0, count_ = 0, first_ = 0;
   std::deque<Known> known_;                             // by number, from first_ on
   std::deque<std::vector<int64_t>> seen_in_ = {{}};     // numbers seen in each of the last blocks
   int64_t left_ = 0, low_ = 0, columns_ = 0, rows_ = 0;  // the cells there are
   std::vector<std::vector<Point>> cells_;
+  std::vector<uint8_t> empty_;  // rings about each cell, itself the first, that hold no point for sure
+  mutable std::vector<Known> sampled_;  // of the points that are there, those with a multiple of `every_`, if it is set
+  mutable std::vector<int64_t> numbers_;  // of these
+  mutable int64_t every_ = 0;
+
+  // The points that are there whose number is a multiple of `every`, side by side.
+  const std::vector<Known>& sampled(int64_t every) const {
+    if (every_ == every) return sampled_;
+    sampled_.clear(), numbers_.clear();
+    every_ = every;
+    for (size_t i = 0; i < known_.size(); ++i) sample(first_ + static_cast<int64_t>(i));
+    return sampled_;
+  }
+
+  void sample(int64_t number) const {
+    const Known& known = known_[static_cast<size_t>(number - first_)];
+    if (every_ == 0 || number % every_ != 0 || known.seen < 0) return;
+    sampled_.push_back(known), numbers_.push_back(number);
+  }
+
+  // Leaves out what is not there any more, of the numbers that are `gone`.
+  void sample_less(std::vector<int64_t>& gone) const {
+    if (every_ == 0 || gone.empty()) return;
+    std::sort(gone.begin(), gone.end());
+    size_t kept = 0, next = 0;
+    for (size_t k = 0; k < numbers_.size(); ++k) {
+      while (next < gone.size() && gone[next] < numbers_[k]) ++next;
+      if (next < gone.size() && gone[next] == numbers_[k]) continue;
+      sampled_[kept] = sampled_[k], numbers_[kept] = numbers_[k], ++kept;
+    }
+    sampled_.resize(kept), numbers_.resize(kept);
+  }
 
   static size_t check(In<double, 2> points, In<double, 2> normals) {
     if (points.shape(1) != 2 || normals.shape(1) != 2 || points.shape(0) != normals.shape(0))
@@ -285,6 +329,20 @@ class PointMap {
   int64_t index(double value) const { return static_cast<int64_t>(std::floor(value / cell_)); }
   size_t cell_of(double x, double y) const {
     return static_cast<size_t>((index(x) - left_) * rows_ + (index(y) - low_));
+  }
+
+  // Tells the cells about one that it holds a point.
+  void tell_around(int64_t i, int64_t j) {
+    for (int64_t a = std::max<int64_t>(0, i - kRings); a <= std::min(columns_ - 1, i + kRings); ++a) {
+      uint8_t* column = empty_.data() + a * rows_;
+      for (int64_t b = std::max<int64_t>(0, j - kRings); b <= std::min(rows_ - 1, j + kRings); ++b)
+        column[b] = std::min(column[b], static_cast<uint8_t>(std::max(std::abs(a - i), std::abs(b - j))));
+    }
+  }
+
+  int64_t empty_rings(int64_t i, int64_t j) const {
+    if (i < left_ || i >= left_ + columns_ || j < low_ || j >= low_ + rows_) return 0;
+    return empty_[static_cast<size_t>((i - left_) * rows_ + (j - low_))];
   }
 
   // Makes room for a place outside: the grid grows by half its size at least.
@@ -313,6 +371,10 @@ class PointMap {
       }
     cells_ = std::move(cells);
     left_ = left, low_ = low, columns_ = columns, rows_ = rows;
+    empty_.assign(cells_.size(), static_cast<uint8_t>(kRings + 1));
+    for (int64_t i = 0; i < columns_; ++i)
+      for (int64_t j = 0; j < rows_; ++j)
+        if (!cells_[i * rows_ + j].empty()) tell_around(i, j);
   }
 
   void renew(int64_t number) {
@@ -326,14 +388,17 @@ class PointMap {
   void forget() {
     if (static_cast<int64_t>(seen_in_.size()) <= blocks_) return;
     const int64_t oldest = block_ - static_cast<int64_t>(seen_in_.size());
+    std::vector<int64_t> gone;
     for (const int64_t number : seen_in_.front()) {
       Known& known = known_[static_cast<size_t>(number - first_)];
       if (known.seen != oldest) continue;
       known.seen = -1;
+      gone.push_back(number);
       auto& here = cells_[cell_of(known.x, known.y)];
       here.erase(std::find_if(here.begin(), here.end(), [&](const Point& p) { return p.number == number; }));
       --count_;
     }
+    sample_less(gone);
     seen_in_.pop_front();
     while (!known_.empty() && known_.front().seen < 0) known_.pop_front(), ++first_;
     if (block_ % blocks_ == 0) shrink();
@@ -390,7 +455,7 @@ class PointMap {
     }
     const int64_t farthest = std::max(std::max(i - left_, left_ + columns_ - 1 - i),
                                       std::max(j - low_, low_ + rows_ - 1 - j));
-    for (int64_t r = 0; r <= farthest; ++r) {
+    for (int64_t r = empty_rings(i, j); r <= farthest; ++r) {
       const double gap = r == 0 ? 0.0 : inner + (r - 1) * cell_;  // nothing in this ring is nearer
       if (gap * gap > best || (r > 0 && gap >= reach)) {
         next = std::min(next, gap * gap);
@@ -403,14 +468,20 @@ class PointMap {
           next = std::min(next, nearest_here);
           return;
         }
+        // No branches but for equals: which point is nearer than those before is a toss.
         for (const Point& q : here) {
           const double d = squared(q, x, y, u, v);
-          if (d < best || (found && d == best && q.number < found->number)) {
-            if (found) next = best;
-            best = d, found = &q;
-          } else if (d < next && &q != found) {
-            next = d;
+          if (d == best) {
+            if (&q == found) continue;
+            next = best;
+            if (found && q.number < found->number) found = &q;
+            continue;
           }
+          const bool nearer = d < best;
+          const double other = nearer ? best : d;
+          next = other < next ? other : next;
+          best = nearer ? d : best;
+          found = nearer ? &q : found;
         }
       });
     }
@@ -502,6 +573,7 @@ class PointMap {
   static constexpr double kWeakest = 1e-6;  // [1/m², 1/rad²] so that a start without pairs stays
   static constexpr double kRounding = 1e-9;  // [m] by which places may err
   static constexpr int64_t kMargin = 16;  // cells around what is there
+  static constexpr int64_t kRings = 6;    // about a point, whose cells know of it
   static constexpr int64_t kMaxCells = int64_t{1} << 26;
 };
 

@@ -3,36 +3,33 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <numeric>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "arrays.hpp"
+#include "sectors.hpp"
 
 namespace viewpoints {
-
-constexpr double kTurn = 6.283185307179586476925286766559;
 
 struct Viewpoint {
   std::vector<double> clear;  // [m] that each beam saw through
   double first, spacing;      // [rad] of the first beam, between beams
   double x, y, cosine, sine;  // of the sensor
   double farthest;            // [m] of all beams
-  bool closed;                // whether the last beam and the first are neighbours
+  mutable std::optional<sectors::Beams> beams;  // once they are asked
+  mutable double clearance = 0;                 // [m] that they were asked with
 
-  bool saw_through(double px, double py, double clearance) const {
+  bool saw_through(double px, double py, double by) const {
     const double dx = px - x, dy = py - y;
     const double squared = dx * dx + dy * dy;
-    const double most = farthest - clearance;
+    const double most = farthest - by;
     if (!(most > 0 && squared < most * most)) return false;
-    const int64_t beams = static_cast<int64_t>(clear.size());
-    double steps = std::fmod(std::atan2(cosine * dy - sine * dx, cosine * dx + sine * dy) - first, kTurn);
-    if (steps < 0) steps += kTurn;
-    steps /= spacing;
-    if (!(steps <= beams - 1 || closed)) return false;
-    int64_t beam = std::llrint(steps);
-    if (beam >= beams) beam = 0;
-    const double before = clear[beam] - clearance;
-    return before > 0 && squared < before * before;
+    if (!beams || clearance != by) {
+      beams.emplace(clear.data(), static_cast<int64_t>(clear.size()), first, spacing, by);
+      clearance = by;
+    }
+    return beams->before(cosine * dx + sine * dy, cosine * dy - sine * dx, squared);
   }
 };
 
@@ -46,14 +43,14 @@ class Viewpoints {
 
   void add(In<double, 1> clear, double first, double spacing, In<double, 1> pose) {
     if (clear.shape(0) < 1 || pose.shape(0) != 3) throw std::invalid_argument("clear: a beam or more, pose: (3,) expected");
-    Viewpoint point;
+    const auto made = std::make_shared<Viewpoint>();
+    Viewpoint& point = *made;
     point.clear.assign(clear.data(), clear.data() + clear.shape(0));
     point.first = first, point.spacing = spacing;
     point.x = pose.data()[0], point.y = pose.data()[1];
     point.cosine = std::cos(pose.data()[2]), point.sine = std::sin(pose.data()[2]);
     point.farthest = *std::max_element(point.clear.begin(), point.clear.end());
-    point.closed = static_cast<double>(point.clear.size()) * spacing > kTurn - spacing / 2;
-    kept_.push_back(std::move(point));
+    kept_.push_back(made);
     if (size() > capacity_) kept_.pop_front();
   }
 
@@ -82,22 +79,22 @@ class Viewpoints {
     return Out<bool>(out, {k, n}, owner);
   }
 
+  // The nearest to a place; of two as near, the older.
+  std::vector<const Viewpoint*> about(double x, double y, int64_t count) const {
+    std::vector<std::pair<double, size_t>> order;
+    for (size_t i = 0; i < kept_.size(); ++i) order.emplace_back(std::hypot(kept_[i]->x - x, kept_[i]->y - y), i);
+    const size_t taken = std::min(order.size(), static_cast<size_t>(std::max<int64_t>(count, 0)));
+    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(taken), order.end());
+    std::vector<const Viewpoint*> nearest;
+    for (size_t i = 0; i < taken; ++i) nearest.push_back(kept_[order[i].second].get());
+    return nearest;
+  }
+
   Viewpoints copy() const { return *this; }
 
  private:
   int64_t capacity_;
-  std::deque<Viewpoint> kept_;
-
-  // The nearest to a place; of two as near, the older.
-  std::vector<const Viewpoint*> about(double x, double y, int64_t count) const {
-    std::vector<std::pair<double, size_t>> order;
-    for (size_t i = 0; i < kept_.size(); ++i) order.emplace_back(std::hypot(kept_[i].x - x, kept_[i].y - y), i);
-    const size_t taken = std::min(order.size(), static_cast<size_t>(std::max<int64_t>(count, 0)));
-    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(taken), order.end());
-    std::vector<const Viewpoint*> nearest;
-    for (size_t i = 0; i < taken; ++i) nearest.push_back(&kept_[order[i].second]);
-    return nearest;
-  }
+  std::deque<std::shared_ptr<const Viewpoint>> kept_;  // copies share them
 };
 
 }  // namespace viewpoints

@@ -60,6 +60,9 @@ class OwnBodyParameters(StageParameters):
     )
 
 
+COUNTED = 64  # scans whose readings are counted together, at the most: it takes less time
+
+
 class OwnBody:
     """Watches raw scans for what moves with the sensor.
 
@@ -118,6 +121,7 @@ class OwnBody:
         self._readings = np.zeros(
             (self._bins + 1, beams), dtype=np.int64
         )  # by range, far ones last
+        self._uncounted: list[FloatArray] = []  # ranges of scans, to be counted together
         self._stood = self.reach = np.zeros(beams)
         self._times = np.zeros(beams, dtype=np.int64)  # that each stood still where it did
         self._look_anew()
@@ -141,9 +145,19 @@ class OwnBody:
     def _count(self, ranges: FloatArray) -> None:
         """Count what each beam reads."""
         self._low, self._high = np.fmin(self._low, ranges), np.fmax(self._high, ranges)
-        beams = np.flatnonzero(np.isfinite(ranges))
-        steps = np.minimum(ranges[beams] / self._p.still, self._bins).astype(np.int64)
-        self._readings[steps, beams] += 1
+        self._uncounted.append(ranges)
+        if len(self._uncounted) == COUNTED:
+            self._add_up()
+
+    def _add_up(self) -> None:
+        """Count the readings of scans that were taken since it was done last."""
+        if not self._uncounted:
+            return
+        ranges = np.array(self._uncounted)
+        _, beams = np.nonzero(np.isfinite(ranges))
+        steps = np.minimum(ranges[np.isfinite(ranges)] / self._p.still, self._bins)
+        np.add.at(self._readings, (steps.astype(np.int64), beams), 1)
+        self._uncounted = []
 
     def _has_moved(self, before: FloatArray, now: FloatArray) -> bool:
         """Whether the robot did between two scans, by what is not near."""
@@ -160,6 +174,7 @@ class OwnBody:
 
     def _remember(self, standing: FloatArray) -> None:
         """Note where beams stood still (n,), and forget those that look farther too often."""
+        self._add_up()
         p, stood = self._p, standing > 0
         same = stood & (np.abs(standing - self._stood) <= p.still)
         self._times = np.where(same, self._times + 1, np.where(stood, 1, self._times))

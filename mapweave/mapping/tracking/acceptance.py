@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.local_map import ScanEvidence
 
 
@@ -109,7 +110,7 @@ def _is_found_again(tracked: ScanMatch, parameters: AcceptanceParameters) -> boo
     and hardly anything speaks against it.
     """
     p, evidence = parameters, tracked.evidence
-    held = np.linalg.eigvalsh(tracked.information[:2, :2])[0]
+    held = ellipse(tracked.information).least
     undisputed = evidence.disputed <= p.undisputed and tracked.surprise <= p.expected
     return bool(held >= p.held and (evidence.score >= p.acceptable or undisputed))
 

@@ -10,8 +10,13 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.geometry.arrays import FloatArray
 from mapweave.kernels.point_map import make_point_map
+from mapweave.kernels.pose_evidence import (
+    EvidenceSettings,
+    evidence_settings,
+    pose_evidence,
+)
 from mapweave.kernels.viewpoints import make_viewpoints
 from mapweave.matching.correlative import CorrelativeParameters, LikelihoodField, search
 from mapweave.matching.icp import CELL, IcpParameters, Target
@@ -113,8 +118,10 @@ class LocalMap:
         p = self._parameters = parameters
         self._known = make_point_map(p.icp.normal_weight, CELL, p.thin, p.keyframes)
         self._viewpoints = make_viewpoints(p.keyframes)
+        self._settings = evidence_settings(_settings(p))
         self._last: FloatArray | None = None
         self._raster: LikelihoodField | None = None
+        self._asked: tuple[Scan, tuple[FloatArray, float, float]] | None = None
 
     def copy(self) -> "LocalMap":
         """Return one that remembers by itself from now on."""
@@ -143,10 +150,9 @@ class LocalMap:
         """
         if not self._is_news(pose):
             return
-        placed, p = oriented.moved(pose), self._parameters
+        placed = oriented.moved(pose)
         self._known.add(placed.points, placed.normals)
-        clear = clear_ranges(scan, p.far_sight)
-        self._viewpoints.add(clear, float(scan.angles[0]), beam_spacing(scan), pose)
+        self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
 
     def search(self, points: FloatArray, centre: FloatArray, max_turn: float) -> FloatArray:
@@ -168,29 +174,30 @@ class LocalMap:
 
         Parameters
         ----------
-        surface
+        oriented
             The oriented points of `scan`, sensor frame.
         """
-        p = self._parameters
-        explained = self._known.explains(oriented.points, oriented.normals, poses, p.overlap)
-        judged = _faced(oriented, p) | (np.hypot(*oriented.points.T) < p.sight)
-        asked = ~explained & judged
-        contradicted = self._viewpoints.free(
-            oriented.points, poses, asked, p.witnesses, p.clearance
-        )
-        through = self._known.seen_through(
-            clear_ranges(scan, p.far_sight),
-            float(scan.angles[0]),
-            beam_spacing(scan),
-            poses,
-            p.clearance,
-            p.sight,
-            p.far_sight,
-            p.facing,
-            p.sample,
-        )
-        shares = zip(explained.mean(axis=1), contradicted.mean(axis=1), through, strict=True)
-        return [ScanEvidence(float(e), float(c), float(t)) for e, c, t in shares]
+        p, count = self._parameters, max(len(oriented), 1)
+        asked = oriented.points, oriented.normals, poses
+        counts = pose_evidence(self._known, self._viewpoints, *asked, self._settings)
+        sight = p.clearance, p.sight, p.far_sight, p.facing
+        through = self._known.seen_through(*self._view(scan), poses, *sight, p.sample)
+        return [
+            ScanEvidence(explained / count, contradicted / count, share)
+            for (explained, contradicted), share in zip(
+                counts.tolist(), through.tolist(), strict=True
+            )
+        ]
+
+    def _view(self, scan: Scan) -> tuple[FloatArray, float, float]:
+        """Return how far each beam saw nothing [m], the first one's angle, their spacing [rad].
+
+        A scan is asked about at many poses, and then remembered.
+        """
+        if self._asked is None or self._asked[0] is not scan:
+            clear = clear_ranges(scan, self._parameters.far_sight)
+            self._asked = scan, (clear, float(scan.angles[0]), beam_spacing(scan))
+        return self._asked[1]
 
     def _is_news(self, pose: FloatArray) -> bool:
         if self._last is None:
@@ -200,8 +207,6 @@ class LocalMap:
         return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
 
 
-def _faced(oriented: OrientedPoints, p: LocalMapParameters) -> BoolArray:
-    """(n,) which points of `surface`, sensor frame, face the sensor and are not too far."""
-    distance = np.maximum(np.hypot(*oriented.points.T), 1e-9)
-    cosine = -np.einsum("ij,ij->i", oriented.points, oriented.normals) / distance
-    return np.asarray((cosine > p.facing) & (distance < p.far_sight))
+def _settings(p: LocalMapParameters) -> EvidenceSettings:
+    sight = p.sight, p.far_sight, p.facing
+    return EvidenceSettings(p.overlap, p.clearance, p.witnesses, *sight)

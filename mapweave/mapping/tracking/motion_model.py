@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.ellipses import ellipse
 
 
 class MotionModelParameters(BaseModel):
@@ -116,7 +117,7 @@ class MotionModel:
         alike = self._alike(turn)
         if len(alike) < p.enough:
             return self._last[0], self._last[1], p.max_sigma
-        return median(x for x, _ in alike), median(y for _, y in alike), self._sigma
+        return median([x for x, _ in alike]), median([y for _, y in alike]), self._sigma
 
     @property
     def is_paced(self) -> bool:
@@ -132,7 +133,7 @@ class MotionModel:
     def add(self, step: FloatArray, information: FloatArray) -> None:
         """Take a step (3,), and the (3, 3) information that held it, in units of one point."""
         x, y, turn = step.tolist()
-        if np.linalg.eigvalsh(information[:2, :2])[0] >= self._p.held:
+        if ellipse(information).least >= self._p.held:
             if len(self._alike(turn)) >= self._p.enough:
                 usual_x, usual_y, _ = self.way(turn)
                 self._off.append(math.hypot(x - usual_x, y - usual_y))
@@ -146,14 +147,17 @@ class MotionModel:
         """Ways that went with turns alike, the latest; to the other side counts as well."""
         p = self._p
         apart = max(p.alike, p.alike_share * abs(turn))
+        low, high = turn - apart, turn + apart
         found: list[tuple[float, float]] = []
         for x, y, turned in reversed(self._steps):
+            if low <= turned <= high:
+                found.append((x, y))
+            elif low <= -turned <= high:
+                found.append((x, -y))
+            else:
+                continue
             if len(found) == p.steps:
                 break
-            if abs(turned - turn) <= apart:
-                found.append((x, y))
-            elif abs(turned + turn) <= apart:
-                found.append((x, -y))
         return found
 
     def _expected(self, turn: float, missed: int, told: FloatArray | None) -> list[_Expected]:

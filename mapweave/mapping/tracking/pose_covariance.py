@@ -4,11 +4,14 @@ Along a corridor's walls nothing holds a scan; across them they do. The error th
 of a scan against what was mapped lately, not what adds up over a path.
 """
 
+import math
+
 import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.ellipses import ellipse
 from mapweave.parameters import StageParameters, derived
 
 EXACT: FloatArray = np.zeros(4)
@@ -55,17 +58,35 @@ def pose_uncertainty(
     if not information.any():
         return EXACT
     p = parameters or PoseCovarianceParameters()
-    unheld = np.diag([p.step, p.step, p.turn]) ** 2
-    covariance = np.linalg.inv(information / p.noise**2 + np.linalg.inv(unheld))
-    covariance += np.diag([p.floor, p.floor, p.turn_floor]) ** 2
-    spread, directions = np.linalg.eigh(covariance[:2, :2])
-    least = np.arctan2(directions[1, 1], directions[0, 1])
-    deviations = np.sqrt([spread[1], spread[0], covariance[2, 2]])
-    return np.array([*deviations, _undirected(float(least))])
+    xx, xy, yy, turn = _covariance(information, p)
+    spread = np.array([[xx + p.floor**2, xy], [xy, yy + p.floor**2]])
+    across, along, least = ellipse(spread)
+    return np.array(
+        [math.sqrt(along), math.sqrt(across), math.hypot(turn**0.5, p.turn_floor), least]
+    )
+
+
+def _covariance(
+    information: FloatArray, p: PoseCovarianceParameters
+) -> tuple[float, float, float, float]:
+    """Return what `information` and steps as they are leave open: xx, xy, yy, and of the turn.
+
+    The inverse of the sum, by cofactors in plain floats, at every scan.
+    """
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = (information / p.noise**2).tolist()
+    xx, yy, tt = xx + p.step**-2, yy + p.step**-2, tt + p.turn**-2
+    first, second, third = yy * tt - yt * yt, xt * yt - xy * tt, xy * yt - xt * yy
+    whole = xx * first + xy * second + xt * third
+    return first / whole, second / whole, (xx * tt - xt * xt) / whole, (xx * yy - xy * xy) / whole
 
 
 def turn_uncertainty(uncertainty: FloatArray, angle: float) -> FloatArray:
     """Return (..., 4) `uncertainty` in a frame in which its own is turned by `angle` [rad]."""
+    if uncertainty.ndim == 1:
+        along, across, turn, direction = uncertainty.tolist()
+        return np.array(
+            [along, across, turn, math.remainder(2 * (direction + angle), 2 * math.pi) / 2]
+        )
     turned = np.array(uncertainty, dtype=float)
     turned[..., 3] = _undirected(turned[..., 3] + angle)
     return turned

@@ -52,6 +52,7 @@ class Reachability:
     def __init__(self, parameters: ReachabilityParameters) -> None:
         self._p = parameters
         self._intervals: deque[float] = deque(maxlen=parameters.intervals)
+        self._interval: float | None = None  # of these
         self._last: tuple[int, float] | None = None
         self._way: deque[_Stay] = deque(maxlen=parameters.remembered)
 
@@ -64,17 +65,13 @@ class Reachability:
     def afresh(self) -> Self:
         """Return one that knows how long scans take, and of no place."""
         other = type(self)(self._p)
-        other._intervals = self._intervals.copy()
+        other._intervals, other._interval = self._intervals.copy(), self._interval
         return other
 
     @property
     def interval(self) -> float | None:
         """The time [s] that a scan usually takes; None where stamps do not tell."""
-        known = self._intervals
-        if not known:
-            return None
-        usual = median(known) if len(known) >= self._p.few else max(known)
-        return usual if usual > 0 else None
+        return self._interval
 
     def tick(self, scan: Scan) -> None:
         """Note that `scan` was taken, be it placed or not."""
@@ -82,6 +79,9 @@ class Reachability:
             index, stamp = self._last
             interval = (scan.stamp - stamp) / max(scan.index - index, 1)
             self._intervals.append(interval if math.isfinite(interval) else 0.0)
+            enough = len(self._intervals) >= self._p.few
+            usual = median(self._intervals) if enough else max(self._intervals)
+            self._interval = usual if usual > 0 else None
         self._last = scan.index, scan.stamp
 
     def placed(self, scan: Scan, pose: FloatArray) -> None:

@@ -17,6 +17,7 @@ from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
     AcceptanceParameters,
     ScanMatch,
@@ -110,6 +111,8 @@ class Tracker:
         self.pose: FloatArray = se2.IDENTITY
         self.missed: list[Observation] = []
         self._motion = MotionModel(self.parameters.motion_model)
+        sigma = self.parameters.prior_sigma, self.parameters.prior_sigma, self.parameters.prior_turn
+        self._prior = np.diag(np.array(sigma) ** -2)
         self._odometry: FloatArray | None = None
         self._local = LocalMap(self.parameters.local_map)
         self._reachability = Reachability(self.parameters.reachability)
@@ -281,10 +284,10 @@ class Tracker:
         saw decides.
         """
         p = self.parameters
-        held, directions = np.linalg.eigh(tracked.information[:2, :2])
-        if held[0] > p.open_direction * held[1]:
+        held = ellipse(tracked.information)
+        if held.least > p.open_direction * held.most:
             return []
-        along, across = directions[:, 0], directions[:, 1]
+        along, across = np.linalg.eigh(tracked.information[:2, :2])[1].T
         way = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))[:2]
         usual = se2.rotation(self.pose[2]) @ way @ along
         steps = np.append(np.arange(-p.open_reach, p.open_reach + 1e-9, p.open_step), usual)
@@ -316,10 +319,9 @@ class Tracker:
         p = self.parameters
         oriented = seen.oriented
         stride = 1 + (len(oriented) - 1) // p.max_points
-        prior = np.diag([p.prior_sigma**-2, p.prior_sigma**-2, p.prior_turn**-2])
         thinned = oriented.at(slice(None, None, stride))
         fits = align_all(
-            thinned, self._local.target, starts, p.local_map.icp, prior, share=p.promising
+            thinned, self._local.target, starts, p.local_map.icp, self._prior, share=p.promising
         )
         poses = np.array([fit.pose for fit in fits])
         judged = self._local.evidence(seen.scan, oriented, poses)

@@ -17,6 +17,11 @@ from mapweave.kernels.point_map import (
     icp_settings,
     make_point_map,
 )
+from mapweave.kernels.pose_evidence import (
+    EvidenceSettings,
+    evidence_settings,
+    pose_evidence_numpy,
+)
 from mapweave.kernels.segmentation import SegmentationSettings
 from mapweave.kernels.viewpoints import NumpyViewpoints
 
@@ -44,11 +49,20 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
 ) -> None:
     rng = np.random.default_rng(seed)
     compiled, twin = both(thin)
+    poses = rng.uniform(-3, 3, (3, 3))
+    beams, every = int(rng.choice([1, 50, 360])), int(rng.integers(1, 4))
+    clear = rng.uniform(0, 9) + rng.uniform(0, rng.choice([0.1, 3.0]), beams)
+    spacing = 2 * np.pi / 360 if beams == 360 else 0.06
+
+    def shares(points: PointMap) -> FloatArray:
+        return points.seen_through(clear, -1.5, spacing, poses, 0.3, 3.0, 6.0, 0.7, every)
+
     for _ in range(count):
         block = oriented(rng, size, rng.choice([1.0, 30.0]))
         tags = rng.integers(-1, 4, size)
         compiled.add(*block, tags)
         twin.add(*block, tags)
+        np.testing.assert_allclose(shares(compiled), shares(twin))
     assert len(compiled) == len(twin)
     for one, other in zip(compiled.content(), twin.content(), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -58,18 +72,9 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
     twin_distance, twin_number = twin.find(*asked, reach)
     np.testing.assert_allclose(distance, twin_distance, rtol=1e-12)
     np.testing.assert_array_equal(number, twin_number)
-    poses = rng.uniform(-3, 3, (3, 3))
     np.testing.assert_array_equal(
         compiled.explains(*asked, poses, 0.5), twin.explains(*asked, poses, 0.5)
     )
-    beams, every = int(rng.choice([1, 50, 360])), int(rng.integers(1, 4))
-    clear = rng.uniform(0, 9) + rng.uniform(0, rng.choice([0.1, 3.0]), beams)
-    spacing = 2 * np.pi / 360 if beams == 360 else 0.06
-
-    def shares(points: PointMap) -> FloatArray:
-        return points.seen_through(clear, -1.5, spacing, poses, 0.3, 3.0, 6.0, 0.7, every)
-
-    np.testing.assert_allclose(shares(compiled), shares(twin))
 
 
 @settings(max_examples=25, deadline=None)
@@ -106,6 +111,25 @@ def test_viewpoints_saw_through_the_same(seed: int, count: int, spacing: float) 
     found = compiled.free(points, poses, asked, 3, 0.3)
     np.testing.assert_array_equal(found, twin.free(points, poses, asked, 3, 0.3))
     assert not found[~asked].any()
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.integers(0, 12), st.integers(0, 60))
+def test_as_many_points_speak_for_and_against_a_pose(seed: int, count: int, size: int) -> None:
+    rng = np.random.default_rng(seed)
+    assert COMPILED is not None
+    known, twin = both(0.05)
+    viewpoints, twin_viewpoints = COMPILED.Viewpoints(8), NumpyViewpoints(8)
+    for _ in range(count):
+        block = oriented(rng, 20)
+        scan = rng.uniform(0, 8, 50), -1.4, 0.12, rng.uniform(-3, 3, 3)
+        for points, views in ((known, viewpoints), (twin, twin_viewpoints)):
+            points.add(*block)
+            views.add(*scan)
+    asked = (*oriented(rng, size, 6.0), rng.uniform(-3, 3, (4, 3)))
+    limits = EvidenceSettings(0.4, 0.3, 3, 2.0, 5.0, 0.7)
+    found = COMPILED.pose_evidence(known, viewpoints, *asked, evidence_settings(limits))
+    np.testing.assert_array_equal(found, pose_evidence_numpy(twin, twin_viewpoints, *asked, limits))
 
 
 @settings(max_examples=25, deadline=None)
