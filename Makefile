@@ -75,6 +75,10 @@ mutations: $(KERNELS)
 bench: $(KERNELS)
 	$(BIN)/python -m benchmarks
 
+.PHONY: bench-wire
+bench-wire: $(KERNELS)
+	$(BIN)/python -m benchmarks wire
+
 .PHONY: docs
 docs: $(KERNELS)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -23,6 +23,7 @@ from benchmarks import (
     shape,
     team,
     twins,
+    usual_counts,
     wire,
 )
 from benchmarks.faults import hostile, kills, lossy, outages
@@ -59,6 +60,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "confidence": fit_confidence,
     "wire": wire,
     "hostile": hostile,
+    "usual-counts": usual_counts,
     "outages": outages,
     "kills": kills,
     "lossy": lossy,

@@ -25,7 +25,12 @@ from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
 from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
-from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
+from mapweave_agent.publication_schedule import (
+    AgentParameters,
+    PublicationSchedule,
+    RegularSchedule,
+    StatusSchedule,
+)
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
 from mapweave_protocol.link.asking import request_map, request_orders_of_coordinator
@@ -89,8 +94,9 @@ class AgentRun:
         self._past = {run.state: run for run in past}
         self._first = first
         self._tell = tell
-        self._publication = PublicationSchedule(parameters.map_interval)
-        self._keeping = PublicationSchedule(parameters.state_interval)
+        self._publication = PublicationSchedule(parameters)
+        self._statuses = StatusSchedule(parameters)
+        self._keeping = RegularSchedule(parameters.state_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
         for run in past:
             self._comparisons.earlier_map(run.map)
@@ -107,7 +113,7 @@ class AgentRun:
             self._whereabouts,
             self._orders,
         )
-        self._outbox = Outbox(session, team, mapper.robot, mapper.boot)
+        self._outbox = Outbox(session, team, mapper.robot, mapper.boot, state.sender)
         self._inbox = Inbox()
         self._mapping = threading.Lock()
         self._live: LiveScans | None = None
@@ -115,7 +121,6 @@ class AgentRun:
         self._changed = False
         self._unkept = False
         self._finished = False
-        self._status_due = 0.0
 
     @property
     def finished(self) -> bool:
@@ -180,7 +185,7 @@ class AgentRun:
     def _leave(self) -> None:
         """Publish what is not yet, and wait a moment for the coordinators that are here."""
         if self._changed and not self._finished:
-            self._publish_map(complete=False)
+            self._publish_map()
         deadline = time.monotonic() + self._parameters.leave_within
         while not self._needs.delivered(self._state_published) and time.monotonic() < deadline:
             self._attend(POLL)
@@ -205,6 +210,8 @@ class AgentRun:
             self._tell(pose)
         self._scans_seen += 1
         self._changed |= placement.placed
+        if placement.pose is not None:
+            self._publication.moved(placement.component, placement.pose)
         self._unkept |= placement.placed
         if placement.submap_finished or placement.lost:
             self._publication.hurry()
@@ -212,10 +219,10 @@ class AgentRun:
             _log.warning("scan %d fits nowhere: a new component begins", scan.index)
 
     def _finish(self) -> None:
-        """Publish the last map, whole, and say that it is the last."""
+        """Publish the last map, and say that it is the last."""
         self._finished = True
         self._mapper.finish()
-        self._publish_map(complete=True)
+        self._publish_map()
         self._publish_status()
         _log.info(
             "finished: %d of %d scans placed, submaps: %d",
@@ -234,16 +241,24 @@ class AgentRun:
             self._reception.take(arrival)
             timeout = 0.0
         now = time.monotonic()
+        if self._reception.met():
+            self._statuses.met(now)
         if self._marks.is_news:
             self._publish_marks()
         if self._changed and not self._finished and self._publication.due(now):
-            self._publish_map(complete=False)
+            self._publish_map()
         if self._unkept and not self._finished and self._keeping.due(now):
             self._keep(self._draw())
         self._compare(now)
         self._supply(now)
-        if now >= self._status_due:
+        if self._statuses.due(now, self._state_told):
             self._publish_status()
+
+    @property
+    def _state_told(self) -> object:
+        """What others are told at once when it changes."""
+        compared = self._finished and dict(self._comparisons.published)
+        return compared, len(self._published.components), self._reception.lacking
 
     def _supply(self, now: float) -> None:
         """Send again what others lack, answer who has asked, and ask for what is lacking here."""
@@ -272,33 +287,31 @@ class AgentRun:
         if outcome is not None:
             found = self._publish_outcome(outcome)
             self._comparisons.done(outcome.comparison, now, outcome.took, found)
-            self._publish_status()
         if not self._comparer.busy:
             comparison = self._comparisons.begin(now)
             if comparison is not None:
                 self._comparer.start(comparison)
 
     def _publish_outcome(self, outcome: ComparisonOutcome) -> Sequence[Alignment]:
-        """Return what was published: nothing where comparing failed."""
+        """Publish what was found, if it is news; return it, nothing where comparing failed."""
         have_met = self._comparisons.have_met(outcome.comparison)
         found = found_in(outcome, have_met=have_met)
         if found is None:
             return ()
         message = message_of(self._mapper.robot, outcome.comparison, found)
-        self._outbox.send_alignments(message)
+        self._outbox.send_news(message, final=self._comparisons.is_final(outcome.comparison))
         self._whereabouts.met(message)
         self._state.keep_found(self._mapper.boot, self._outbox.found)
         return found
 
-    def _publish_map(self, *, complete: bool) -> None:
+    def _publish_map(self) -> None:
         self._changed = False
         self._published = self._draw()
-        arrives = self._outbox.send_map(self._published, complete=complete)
+        arrives, size = self._outbox.send_map(self._published, complete=False)
         self._tell(self._published)
         self._keep(self._published)
-        # Peers compare what has arrived: so do we, that it is decided alike on both ends.
         self._comparisons.own_map(arrives, finished=self._finished)
-        self._publication.published(time.monotonic())
+        self._publication.published(time.monotonic(), size)
 
     def _draw(self) -> RobotMap:
         """Return the map as it is now; what changes while it is drawn is still to be kept."""
@@ -309,7 +322,7 @@ class AgentRun:
 
     def _keep(self, robot_map: RobotMap) -> None:
         self._state.keep(robot_map)
-        self._keeping.published(time.monotonic())
+        self._keeping.done(time.monotonic())
 
     @property
     def _state_published(self) -> MapVersion | None:
@@ -343,7 +356,7 @@ class AgentRun:
             orders=self._orders.digest,
         )
         self._outbox.send_status(status)
-        self._status_due = time.monotonic() + self._parameters.status_interval
+        self._statuses.sent(time.monotonic(), self._state_told)
 
 
 def _scans_placed(robot_map: RobotMap) -> int:

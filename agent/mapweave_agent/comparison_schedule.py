@@ -175,6 +175,10 @@ class ComparisonSchedule:
         """Tell whether the two runs that `comparison` is of were joined once."""
         return self._pair(comparison.reference, comparison.other).met
 
+    def is_final(self, comparison: Comparison) -> bool:
+        """Tell whether both maps are the last ones of their robots."""
+        return all(self._is_last(end) for end in (comparison.reference, comparison.other))
+
     def done(
         self, comparison: Comparison, now: float, took: float, found: Sequence[Alignment] = ()
     ) -> None:
@@ -261,6 +265,12 @@ class ComparisonSchedule:
     def _is_over(self, own: RobotMap, other: RobotMap) -> bool:
         """Tell whether one of the two is of a run that another one has followed."""
         return own is not self._own or other.boot in self._earlier or self._team.is_over(other)
+
+    def _is_last(self, robot_map: RobotMap) -> bool:
+        """Tell whether a map is the last of its run."""
+        if run_of(robot_map) in self._own_runs:
+            return self._own_finished or robot_map.boot in self._earlier
+        return self._team.is_last(robot_map)
 
     def _due(self, pair: tuple[RobotMap, RobotMap], rests_until: float, now: float) -> bool:
         own, other = pair

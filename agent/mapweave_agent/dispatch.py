@@ -73,6 +73,18 @@ class Dispatcher:
         self._namesakes = Claimants()
         self._namesakes.take(boot, here=True)
         self._assembler = MapAssembler()
+        self._met = False
+        self._incomplete: frozenset[str] = frozenset()
+
+    @property
+    def lacking(self) -> frozenset[str]:
+        """Robots of whose maps a newer version is known than is here."""
+        return self._incomplete
+
+    def met(self) -> bool:
+        """Tell whether a robot or a coordinator came since this was asked the last time."""
+        met, self._met = self._met, False
+        return met
 
     @property
     def refused(self) -> int:
@@ -83,6 +95,7 @@ class Dispatcher:
         """Take in what arrived."""
         presence = read_presence(arrival, self.refusals)
         coordinator = read_coordinator(arrival, self.refusals)
+        self._met |= (presence is not None or coordinator is not None) and not arrival.gone
         if presence is not None:
             self._take_presence(presence)
         elif coordinator is not None:
@@ -142,6 +155,7 @@ class Dispatcher:
             robot_map = self._assembler.update(message)
             if robot_map is not None:
                 self._plan.peer_map(robot_map)
+            self._lacks(message.robot, missing=self._assembler.missing(message.robot))
 
     def _take_status(self, arrival: Arrival) -> None:
         status = self._statuses.read(arrival)
@@ -150,6 +164,9 @@ class Dispatcher:
         self._note(status.robot)
         self._needs.peer(status)
         self._check_map_of(status)
+        held = {(state.robot, state.boot): state.version for state in self._plan.held}
+        newest = held.get((status.robot, status.boot), 0)
+        self._lacks(status.robot, missing=status.submaps > 0 and newest < status.map_version)
         if status.state == "finished":
             self._plan.peer_finished(status.robot, status.boot, status.map_version)
 
@@ -173,6 +190,9 @@ class Dispatcher:
         """Forget what is known of a robot that never came with a map."""
         self._plan.team.forget(robot)
         self._assembler.forget(robot)
+
+    def _lacks(self, robot: str, *, missing: bool) -> None:
+        self._incomplete = self._incomplete | {robot} if missing else self._incomplete - {robot}
 
     def _take_alignment(self, arrival: Arrival) -> None:
         message = self._alignments.read(arrival)

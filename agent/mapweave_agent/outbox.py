@@ -10,6 +10,7 @@ import zenoh
 import zenoh.ext as ze
 
 from mapweave.maps import RobotMap
+from mapweave.team.news import is_news
 from mapweave_agent.past_runs import PastRun
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import (
@@ -46,14 +47,18 @@ class Outbox:
     ----------
     session
         Stays the caller's.
+    sender
+        Codes the maps.
     """
 
-    def __init__(self, session: zenoh.Session, team: str, robot: str, boot: str) -> None:
+    def __init__(
+        self, session: zenoh.Session, team: str, robot: str, boot: str, sender: MapSender
+    ) -> None:
         self._session = session
         self._team = team
         self._robot = robot
         self._boot = boot
-        self._sender = MapSender()
+        self._sender = sender
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[frozenset[Run], AlignmentMessage] = {}
         self._marked: dict[str, MarksMessage] = {}
@@ -104,10 +109,17 @@ class Outbox:
         """What was published last of each pair of runs."""
         return self._found.values()
 
-    def send_map(self, robot_map: RobotMap, *, complete: bool) -> RobotMap:
-        """Publish a version of the map, or all of it if `complete`; return it as it arrives."""
-        self._put("map", self._maps, self._sender.payload(robot_map, complete=complete))
-        return self._sender.as_sent(robot_map)
+    def send_map(self, robot_map: RobotMap, *, complete: bool) -> tuple[RobotMap, int]:
+        """Publish a version of the map, or all of it if `complete`.
+
+        Returns
+        -------
+        RobotMap, int
+            The map as it arrives, and the size of the message [bytes].
+        """
+        payload = self._sender.payload(robot_map, complete=complete)
+        self._put("map", self._maps, payload)
+        return self._sender.as_sent(robot_map), len(payload)
 
     def send_past(self, run: PastRun) -> None:
         """Publish the map of an earlier run."""
@@ -127,6 +139,21 @@ class Outbox:
             self._alignments[pair] = self._declared.enter_context(publisher)
         self._found[frozenset(states_of((message.reference, message.other)))] = message
         self._put("alignment", publisher, encode(message))
+
+    def send_news(self, message: AlignmentMessage, *, final: bool) -> None:
+        """Publish what was found about a pair of robots where it differs from what was told.
+
+        Parameters
+        ----------
+        final
+            Whether it is the last: then any difference counts.
+        """
+        told = self._found.get(frozenset(states_of((message.reference, message.other))))
+        if told is not None:
+            same = told.alignments == message.alignments
+            if same or not (final or is_news(message.unpack(), told.unpack())):
+                return
+        self.send_alignments(message)
 
     def send_status(self, message: StatusMessage) -> None:
         """Publish how far the robot is."""
@@ -151,7 +178,7 @@ class Outbox:
             if str(query.parameters) == ORDERS:
                 query.reply(AGENT_QUERY.build(**parts), encode(orders))
                 return
-            query.reply(MAP.build(**parts), self._sender.payload(robot_map, complete=True))
+            query.reply(MAP.build(**parts), self._sender.whole(robot_map))
             for message in self._found.values():
                 query.reply(self._key_of(message), encode(message))
             for marks in self._marked.values():

@@ -81,6 +81,11 @@ class PastRun:
 class StateFolder:
     """The folder of a robot's runs; made where it is missing.
 
+    Attributes
+    ----------
+    sender
+        Codes the maps of the run that is kept: the same for the wire, so that it is done once.
+
     Raises
     ------
     FileError
@@ -89,7 +94,7 @@ class StateFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._sender = MapSender()
+        self.sender = MapSender()
         self._has_room = True
         try:
             path.mkdir(parents=True, exist_ok=True)
@@ -102,7 +107,7 @@ class StateFolder:
         Where there is no room for it, the last one stays; that is told once, as is when there is
         room again: a full disk must not keep a robot from its work.
         """
-        payload = self._sender.payload(robot_map, complete=True)
+        payload = self.sender.whole(robot_map)
         self._write(f"{robot_map.boot}{SUFFIX}", payload)
 
     def keep_marks(self, message: MarksMessage) -> None:

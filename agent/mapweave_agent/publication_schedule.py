@@ -1,6 +1,15 @@
 """How often a robot does what, and when its map is due; no clock and no network in here."""
 
+import math
+
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+
+from mapweave.geometry.arrays import FloatArray
+from mapweave_protocol.link.lacking import GRACE
+
+MOST_SAVED = 1000.0  # [bytes], and most that is owed: a whole map now and then is no growth
+AGAIN = GRACE + 0.5  # [s] after somebody came: what is still missing then did not arrive by itself
 
 
 class AgentParameters(BaseModel):
@@ -9,7 +18,7 @@ class AgentParameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     map_interval: float = Field(
-        2.0, gt=0, description="[s] at most this often the growing submap is published"
+        2.0, gt=0, description="[s] at most this often the growing submap is published, if driven"
     )
     state_interval: float = Field(
         1.5, gt=0, description="[s] at least this often the growing map is kept on disk"
@@ -29,16 +38,47 @@ class AgentParameters(BaseModel):
         description="[s] that a pair whose shapes do not say that both saw one place lets others"
         " go first",
     )
-    status_interval: float = Field(1.0, gt=0, description="[s] between statuses, as designed")
+    map_distance: float = Field(
+        2.0, gt=0, description="[m] driven after which the growing submap is published"
+    )
+    map_patience: float = Field(
+        10.0, gt=0, description="[s] after which it is published though less was driven"
+    )
+    bytes_per_metre: float = Field(
+        70.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
+    )
+    bytes_per_second: float = Field(
+        2.0,
+        ge=0,
+        description="[1/s] of maps besides: a place may change while it stands",
+    )
+    status_interval: float = Field(
+        10.0, gt=0, description="[s] between statuses: a slow robot drives 2 m meanwhile"
+    )
+    least_status_interval: float = Field(
+        1.0, ge=0, description="[s] after a status before the next, whatever has changed"
+    )
 
 
 class PublicationSchedule:
-    """When to publish the map: at once when a submap was finished, else at a bounded rate."""
+    """When to publish the map: at once when a submap was finished, else as far as was driven."""
 
-    def __init__(self, interval: float) -> None:
-        self._interval = interval
+    def __init__(self, parameters: AgentParameters) -> None:
+        self._parameters = parameters
         self._last: float | None = None
+        self._driven = 0.0
+        self._allowed = 0.0  # [bytes] that the way and the time allowed and no message has used
+        self._size = 0  # [bytes] of the last growing submap
+        self._at: tuple[int, FloatArray] | None = None
         self._urgent = True
+
+    def moved(self, component: int, pose: FloatArray) -> None:
+        """Take in where the robot is, ``(3,)`` [m, m, rad] in the frame of `component`."""
+        if self._at is not None and self._at[0] == component:
+            step = float(np.hypot(*(pose - self._at[1])[:2]))
+            self._driven += step
+            self._allowed += step * self._parameters.bytes_per_metre
+        self._at = component, pose
 
     def hurry(self) -> None:
         """Say that what changed is worth a message at once."""
@@ -46,9 +86,66 @@ class PublicationSchedule:
 
     def due(self, now: float) -> bool:
         """Tell whether a map that has changed is to be published."""
-        return self._urgent or self._last is None or now - self._last >= self._interval
+        if self._urgent or self._last is None:
+            return True
+        p, waited = self._parameters, now - self._last
+        if waited < p.map_interval or self._allowed + waited * p.bytes_per_second < self._size:
+            return False
+        return self._driven >= p.map_distance or waited >= p.map_patience
 
-    def published(self, now: float) -> None:
-        """Note that the map has been published."""
+    def published(self, now: float, size: int = 0) -> None:
+        """Note that the map has been published, in so many bytes."""
+        waited = 0.0 if self._last is None else now - self._last
+        allowed = self._allowed + waited * self._parameters.bytes_per_second - size
+        self._allowed = min(max(allowed, -MOST_SAVED), MOST_SAVED)
+        if not self._urgent:
+            self._size = size
         self._last = now
+        self._driven = 0.0
         self._urgent = False
+
+
+class RegularSchedule:
+    """When to do what is to be done at a bounded rate."""
+
+    def __init__(self, interval: float) -> None:
+        self._interval = interval
+        self._last = -math.inf
+
+    def due(self, now: float) -> bool:
+        """Tell whether it is time."""
+        return now - self._last >= self._interval
+
+    def done(self, now: float) -> None:
+        """Note that it was done."""
+        self._last = now
+
+
+class StatusSchedule:
+    """When to say how one is: when something has changed, when somebody comes, and now and then."""
+
+    def __init__(self, parameters: AgentParameters) -> None:
+        self._parameters = parameters
+        self._said: object = None
+        self._last = -math.inf
+        self._heard_again = -math.inf
+
+    def met(self, now: float) -> None:
+        """Note that somebody came or went: who was away hears at once what is here, and again.
+
+        The second time tells whether what the first one said was missing is still on its way.
+        """
+        self._last = min(self._last, now - self._parameters.status_interval)
+        self._heard_again = now + AGAIN
+
+    def due(self, now: float, state: object) -> bool:
+        """Tell whether a status is to be sent; `state` is what others are told of at once."""
+        waited = now - self._last
+        if waited < self._parameters.least_status_interval:
+            return False
+        again = self._last < self._heard_again <= now
+        return again or state != self._said or waited >= self._parameters.status_interval
+
+    def sent(self, now: float, state: object) -> None:
+        """Note that a status was sent."""
+        self._last, self._said = now, state

@@ -22,11 +22,12 @@ from mapweave_protocol.link import session
 from mapweave_protocol.link.asking import request_all_of, request_orders_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
+from mapweave_protocol.link.joint_changes import JointSender
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
-from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.joint_status_message import frames_of
-from mapweave_protocol.wire.messages import JointStatusMessage
+from mapweave_protocol.wire.messages import JointMapMessage, JointStatusMessage
 
 POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
 ANSWERERS = 4  # one slow asker must not keep the others waiting
@@ -80,6 +81,7 @@ class Service:
         self._intake = Intake(self._coordinator, store, self._story)
         self._intake.restore()
         self._inbox = Inbox()
+        self._joints = JointSender()
         self._boot = keys.new_boot()
         self._status_due = 0.0
         self._builder = VersionBuilder(store.series, config or Config())
@@ -154,7 +156,8 @@ class Service:
         built = self._builder.take()
         if built is not None:
             # Stored first: what was published once must be there after a crash.
-            self._publisher.put(self._keep(built))
+            kept = decode(JointMapMessage, self._keep(built))
+            self._publisher.put(self._joints.payload(kept))
             self._frames = frames_of(built.joint)
             self._status_due = 0.0  # robots wait for their new frames
             self._feed.show_version(built.draft.version, built.draft.maps)
@@ -182,7 +185,7 @@ class Service:
         """Publish the latest version of the store: the cache died with the last publisher."""
         latest = self._store.version(self._store.latest_version)
         if latest is not None:
-            self._publisher.put(latest)
+            self._publisher.put(self._joints.payload(decode(JointMapMessage, latest)))
             _log.info("version %d published again", self._store.latest_version)
 
     def _publish_status(self) -> None:

@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 from mapweave.maps import Alignment, Decision, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason
 from mapweave_agent.comparison_schedule import Comparison, ComparisonSchedule
-from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
+from mapweave_agent.publication_schedule import (
+    AGAIN,
+    AgentParameters,
+    PublicationSchedule,
+    StatusSchedule,
+)
 from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.wire.joint_status_message import Place
 from mapweave_protocol.wire.messages import (
@@ -281,16 +286,71 @@ def work(side: Side, now: float) -> None:
         side.under_way = side.plan.begin(now)
 
 
-def test_a_finished_submap_is_published_at_once_and_growth_at_a_bounded_rate() -> None:
-    plan = PublicationSchedule(interval=2.0)
+def drive(plan: PublicationSchedule, start: float, end: float, component: int = 0) -> None:
+    for x in np.linspace(start, end, 5):
+        plan.moved(component, np.array([x, 0.0, 0.0]))
+
+
+def test_a_finished_submap_is_published_at_once_and_growth_as_far_as_was_driven() -> None:
+    plan = PublicationSchedule(AgentParameters())
     assert plan.due(0.0)
     plan.published(0.0)
-    assert not plan.due(1.9)
+    drive(plan, 0.0, 1.9)
+    assert not plan.due(9.9)
+    assert plan.due(10.0)
+    drive(plan, 1.9, 2.1)
     assert plan.due(2.0)
+    assert not plan.due(1.9)  # however fast it drives
     plan.hurry()
     assert plan.due(0.1)
     plan.published(0.1)
-    assert not plan.due(0.2)
+    assert not plan.due(9.0)
+
+
+def test_growth_waits_until_the_way_has_paid_for_it() -> None:
+    p = AgentParameters()
+    plan = PublicationSchedule(p)
+    plan.published(0.0)
+    drive(plan, 0.0, 2.0)
+    assert plan.due(2.0)
+    plan.published(2.0, size=500)
+    drive(plan, 2.0, 4.5)
+    assert not plan.due(4.0)
+    plan.hurry()  # what has settled does not wait
+    assert plan.due(4.0)
+    plan.published(4.0, size=100)
+    drive(plan, 4.5, 20.0)
+    assert plan.due(6.0)
+
+
+def test_a_leap_into_another_component_is_no_way_driven() -> None:
+    plan = PublicationSchedule(AgentParameters())
+    plan.published(0.0)
+    drive(plan, 0.0, 0.5)
+    drive(plan, 100.0, 100.5, component=1)
+    assert not plan.due(5.0)
+
+
+def test_a_status_is_sent_on_a_change_and_now_and_then() -> None:
+    statuses = StatusSchedule(AgentParameters())
+    assert statuses.due(0.0, "mapping")
+    statuses.sent(0.0, "mapping")
+    assert not statuses.due(9.9, "mapping")
+    assert statuses.due(10.0, "mapping")
+    assert not statuses.due(0.9, "finished")
+    assert statuses.due(1.0, "finished")
+
+
+def test_whoever_comes_hears_at_once_and_when_what_was_missing_should_have_come() -> None:
+    statuses = StatusSchedule(AgentParameters())
+    statuses.sent(0.0, "mapping")
+    statuses.met(1.0)
+    assert statuses.due(1.0, "mapping")
+    statuses.sent(1.0, "mapping")
+    assert not statuses.due(0.9 + AGAIN, "mapping")
+    assert statuses.due(1.0 + AGAIN, "mapping")
+    statuses.sent(1.0 + AGAIN, "mapping")
+    assert not statuses.due(10.9 + AGAIN, "mapping")
 
 
 def joined(*names: str) -> JointStatusMessage:

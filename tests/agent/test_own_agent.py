@@ -167,8 +167,8 @@ def test_scans_are_mapped_while_the_agent_is_held_up_with_everything_else(
 def test_what_fails_beside_the_mapping_ends_the_agent(
     endpoint: str, team: str, logs: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(_: AgentRun, *, complete: bool) -> None:
-        raise FileError("state", f"is full ({complete})")
+    def fail(_: AgentRun) -> None:
+        raise FileError("state", "is full")
 
     monkeypatch.setattr(AgentRun, "_publish_map", fail)
 

@@ -36,6 +36,7 @@ from mapweave.reasons import Reason
 from mapweave_protocol.link import session
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Inbox, joint_reader
+from mapweave_protocol.link.joint_changes import JointAssembler
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
@@ -183,6 +184,7 @@ class Watcher:
         key = keys.JOINT_MAP.build(team=team)
         stack.enter_context(session.declare_subscriber(connection, key, self._inbox.put))
         self._reader = joint_reader()
+        self._assembler = JointAssembler()
 
     def next(self) -> JointMap:
         """Return the next version."""
@@ -197,7 +199,9 @@ class Watcher:
             return None
         message = self._reader.read(arrival)
         assert message is not None
-        return message.unpack()
+        whole = self._assembler.update(message)
+        assert whole is not None
+        return whole.unpack()
 
 
 class Network:

@@ -105,16 +105,16 @@ class Whereabouts:
             robot=self._robot,
             boot=self._boot,
             stamp=scan.stamp if math.isfinite(scan.stamp) else None,
-            sent=now,
+            sent=round(now, 3),
             scan_index=scan.index,
             found=placement.pose is not None,
             component=component,
             pose=to_transform(last.pose),
             covariance=to_covariance(covariance),
-            joint=self._joint(self._first + last.component, last.pose, covariance),
+            joint=self._joint(self._first + last.component, last.pose),
         )
 
-    def _joint(self, number: int, pose: FloatArray, covariance: FloatArray) -> JointPose | None:
+    def _joint(self, number: int, pose: FloatArray) -> JointPose | None:
         with self._frames:
             frames = {} if self._status is None else self._status.frames
             names = (component_name(name, number) for name in self._names)
@@ -125,13 +125,10 @@ class Whereabouts:
         if placed is None:
             return None
         frame, since, place = placed
-        to_joint = np.eye(3)
-        to_joint[:2, :2] = se2.rotation(place[2])
         return JointPose(
             frame=frame,
             since=since,
             pose=to_transform(se2.compose(place, pose)),
-            covariance=to_covariance(to_joint @ covariance @ to_joint.T),
         )
 
     def _is_told(self, frame: str, name: str, joined: bool) -> bool:

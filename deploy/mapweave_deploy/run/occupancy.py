@@ -27,7 +27,7 @@ def grid_bytes(member: Member, robot_map: RobotMap) -> tuple[int, int]:
 
     One byte a cell, over the bounding box of what the scans saw from where they were placed.
     """
-    scans = _scans_of(member, robot_map)
+    scans = scans_of(member, robot_map)
     plain = deflated = 0
     for component in robot_map.components:
         index, poses = component_path(robot_map, component)
@@ -37,7 +37,7 @@ def grid_bytes(member: Member, robot_map: RobotMap) -> tuple[int, int]:
     return plain, deflated
 
 
-def _scans_of(member: Member, robot_map: RobotMap) -> dict[int, Scan]:
+def scans_of(member: Member, robot_map: RobotMap) -> dict[int, Scan]:
     """Return by index the scans that `robot_map` places."""
     placed = {int(i) for submap in robot_map.submaps for i in submap.trajectory.scan_index}
     scans = read_scans(member.log, on_warning=lambda _: None)

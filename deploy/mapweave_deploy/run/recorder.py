@@ -8,10 +8,10 @@ from mapweave.errors import InvalidIdError
 from mapweave_protocol.errors import ForeignKeyError
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.narration.watch import Watcher
-from mapweave_protocol.wire.keys import ALIGNMENT, MAP, STATUS, KeyFormat
+from mapweave_protocol.wire.keys import ALIGNMENT, MAP, POSE, STATUS, KeyFormat
 from mapweave_protocol.wire.messages import StatusMessage
 
-KINDS = {"map": MAP, "alignment": ALIGNMENT, "status": STATUS}
+KINDS = {"map": MAP, "alignment": ALIGNMENT, "pose": POSE, "status": STATUS}
 
 
 @dataclass

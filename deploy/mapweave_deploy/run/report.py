@@ -15,6 +15,7 @@ from mapweave_deploy.run.evaluation import (
     main_component,
     scan_counts,
 )
+from mapweave_deploy.run.key_scans import APART, key_scan_bytes, path_length
 from mapweave_deploy.run.launcher import TeamOutcome
 from mapweave_deploy.run.occupancy import grid_bytes
 from mapweave_deploy.run.team_plan import Member
@@ -131,25 +132,37 @@ def _tell_error(verdict: PairEvaluation) -> str:
 
 
 def _tell_traffic(outcome: TeamOutcome, members: Sequence[Member]) -> Iterator[str]:
-    yield "What each robot sent:"
+    yield "What each robot sent, bytes for each metre it drove:"
     for member in members:
         counts = outcome.recorder.sent(member.robot)
+        robot_map = outcome.maps.get(member.robot)
+        metres = 0.0 if robot_map is None else path_length(robot_map)
         total = sum(count.size for count in counts.values())
         kinds = ", ".join(
-            f"{_size(count.size)} in {count.messages} {kind} messages"
+            f"{kind} {_rate(count.size, metres)} in {count.messages} messages"
             for kind, count in counts.items()
         )
-        yield f"  {member.robot}: {_size(total)}: {kinds}"
-        if member.robot in outcome.maps:
-            yield f"      {_tell_grid(outcome.maps[member.robot], member)}"
+        yield f"  {member.robot}: {_size(total)}, {_rate(total, metres)} a metre: {kinds}"
+        if robot_map is not None:
+            yield from (f"      {line}" for line in _tell_others(robot_map, member, metres))
 
 
-def _tell_grid(robot_map: RobotMap, member: Member) -> str:
+def _tell_others(robot_map: RobotMap, member: Member, metres: float) -> Iterator[str]:
+    """Yield what others would send of the same scans."""
+    keys = key_scan_bytes(member, robot_map)
     plain, deflated = grid_bytes(member, robot_map)
-    return (
+    yield (
+        f"the same drive as scans every {APART:g} m, deflated: {_size(keys)},"
+        f" {_rate(keys, metres)} a metre"
+    )
+    yield (
         f"the same scans as an occupancy grid of 5 cm, once: {_size(plain)},"
         f" deflated {_size(deflated)}"
     )
+
+
+def _rate(count: int, metres: float) -> str:
+    return f"{count / metres:.0f} B" if metres else f"{count} B"
 
 
 def _size(count: int) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from mapweave.maps import RobotMap, Submap
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.geometry import PackedSubmap
+from mapweave_protocol.wire.geometry import PackedSubmap, SubmapStream
 from mapweave_protocol.wire.map_message import MapMessage, Place, state_of
 
 MESSAGES_TO_COMPLETE = 64  # at most, from one complete message to the next: a cache holds as many
@@ -24,6 +24,7 @@ class MapSender:
         self._sent: dict[int, bytes] = {}
         self._places: dict[int, Place] = {}
         self._messages_since: int | None = None
+        self._stream = SubmapStream()
 
     def payload(self, robot_map: RobotMap, *, complete: bool = False) -> bytes:
         """Return what to publish so that receivers get to `robot_map`.
@@ -42,14 +43,26 @@ class MapSender:
         """
         packed = [self._pack(submap) for submap in robot_map.submaps]
         changed = {p.id for p in packed if self._sent.get(p.id) != p.digest}
-        everything = {p.id for p in packed}
         whole = complete or self._due
-        included, before = (everything, None) if whole else (changed, self._places)
-        payload = encode(MapMessage.of_packed(robot_map, packed, included, before))
+        if whole:
+            payload = self.whole(robot_map)
+        else:
+            payload = encode(MapMessage.of_packed(robot_map, packed, changed, self._places))
         self._sent = {p.id: p.digest for p in packed}
         self._places = {submap.id: Place.of(submap) for submap in robot_map.submaps}
         self._messages_since = 0 if whole else (self._messages_since or 0) + 1
         return payload
+
+    def whole(self, robot_map: RobotMap) -> bytes:
+        """Return the complete message of `robot_map`; what was in the last one is not coded again.
+
+        Raises
+        ------
+        MessageError
+            If the map is too large for a message.
+        """
+        packed = [self._pack(submap) for submap in robot_map.submaps]
+        return encode(MapMessage.whole(robot_map, packed, self._stream))
 
     def as_sent(self, robot_map: RobotMap) -> RobotMap:
         """Return `robot_map` as it arrives, so that both ends decide alike."""
@@ -97,6 +110,7 @@ class _Run:
     places: dict[int, tuple[int, Place | None]] = field(default_factory=dict)
     newest: MapMessage | None = None
     delivered: int = -1
+    stream: SubmapStream = field(default_factory=SubmapStream)
 
     def take(self, message: MapMessage) -> None:
         """Keep what is newer in `message` than what is held."""
@@ -176,7 +190,7 @@ class MapAssembler:
         """
         run = self._runs[robot_map.robot][robot_map.boot]
         packed = [run.held[submap.id].packed for submap in robot_map.submaps]
-        return MapMessage.of_packed(robot_map, packed, {p.id for p in packed})
+        return MapMessage.whole(robot_map, packed, run.stream)
 
     def missing(self, robot: str) -> bool:
         """Tell whether a newer map of `robot` is known of than could be put together."""

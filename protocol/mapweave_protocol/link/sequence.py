@@ -4,13 +4,17 @@ Anybody may publish what looks like a version, so what is published is a hint: w
 so far ahead, and which numbering is the team's, is what the coordinator answers when it is asked.
 """
 
+import logging
 import math
 from collections.abc import Sequence
 
 from mapweave.maps import JointMap
+from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.joint_changes import JointAssembler
 from mapweave_protocol.wire.messages import JointMapMessage
 from mapweave_protocol.wire.queries import JointQuery
 
+_log = logging.getLogger(__name__)
 MAX_WAITING = 64
 ASKED_AT_ONCE = 32  # versions: a long history comes in portions
 SHORT_HISTORY = 16  # versions: what a coordinator's cache holds
@@ -37,6 +41,7 @@ class JointSequence:
         self._newest = 0
         self._series: str | None = None
         self._waiting: dict[int, JointMapMessage] = {}
+        self._assembler = JointAssembler()
         self._tries = 0
         self._has_answer = False
         self._strangers = _Strangers()
@@ -99,10 +104,11 @@ class JointSequence:
     def take(self) -> JointMap | None:
         """Return the next joint map, None if it is not here."""
         following = self._waiting.pop((self._last or 0) + 1, None)
-        if following is None:
+        whole = None if following is None else self._whole(following)
+        if whole is None:
             return None
-        self._last, self._tries, self._since = following.version, 0, None
-        return following.unpack()
+        self._last, self._tries, self._since = whole.version, 0, None
+        return whole.unpack()
 
     def give_up(self) -> int:
         """Count a try to close the gap that did not help; skip the gap after several.
@@ -128,7 +134,19 @@ class JointSequence:
         self._last = min(self._waiting) - 1
         return self._last - last
 
+    def _whole(self, message: JointMapMessage) -> JointMapMessage | None:
+        """Return `message` complete; None where it is not, and is to be asked for."""
+        try:
+            return self._assembler.update(message)
+        except MessageError as error:
+            _log.warning("%s: asked for again", error)
+            return None
+
     def _take_in(self, message: JointMapMessage) -> None:
+        if self._last is None and message.changes:
+            # What it changes is not here, so the latest version is asked for.
+            self._newest = max(self._newest, message.version)
+            return
         if self._last is None:
             self._last = 0 if message.version <= self._whole_up_to else message.version - 1
         self._newest = max(self._newest, message.version)

@@ -34,6 +34,7 @@ from mapweave_protocol.link.inbox import (
     read_presence,
     status_reader,
 )
+from mapweave_protocol.link.joint_changes import JointAssembler
 from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import declare_subscriber, open_session
 from mapweave_protocol.narration.story import Story
@@ -68,6 +69,7 @@ class Watcher:
         self.story = Story()
         self._coverage = CoverageStory()
         self._assembler = MapAssembler()
+        self._joint = JointAssembler()
         self._told: tuple[str, int] | None = None
         self._strangers = Strangers(self._forget)
         self._refusals = refusals = Refusals()
@@ -85,10 +87,16 @@ class Watcher:
             yield from teller(arrival)
 
     def tell_joint(self, message: JointMapMessage) -> Iterator[str]:
-        """Yield the lines that tell a version of the joint map, once."""
-        if self._told != (message.series, message.version):
+        """Yield the lines that tell a version of the joint map, once.
+
+        What changed of a version that was missed is passed over: a complete one comes soon.
+        """
+        if self._told == (message.series, message.version):
+            return
+        whole = self._joint.update(message)
+        if whole is not None:
             self._told = message.series, message.version
-            joint = message.unpack()
+            joint = whole.unpack()
             yield from self.story.joined(joint)
             yield from self._coverage.changed(joint)
 

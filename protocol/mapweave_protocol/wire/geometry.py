@@ -1,6 +1,7 @@
 """The parts of messages that hold geometry: submaps and line maps, as whole numbers."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
 from typing import Self
@@ -10,7 +11,8 @@ import numpy as np
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import LineMap, Submap
-from mapweave_protocol.wire.coding.entropy import Coder
+from mapweave_protocol.wire.coding.changes import code_changed_free_space, code_changed_lines
+from mapweave_protocol.wire.coding.entropy import Coder, Decoder, Encoder
 from mapweave_protocol.wire.coding.free_space_code import CodedFreeSpace, code_free_space
 from mapweave_protocol.wire.coding.line_code import CodedLines, code_lines, main_turn
 from mapweave_protocol.wire.coding.trajectory_code import Clock, CodedTrajectory, code_trajectory
@@ -20,6 +22,8 @@ SUBMAP_REACH = 1e3  # [m] from a submap's origin; submaps are some 20 m across
 MAX_SUBMAPS = 4096  # of one robot: some 60 km of path
 DIGEST_SIZE = 8  # [bytes]
 MAX_BYTES = 8 * 2**20  # of one stream
+STAGES = 3  # the submap that grows, the one that has just settled, and one more
+ANOTHER = "submaps"  # the context of whether another one follows
 MAX_WALL = 100_000.0  # [m] of one line map; comparing maps takes time and memory by the metre
 
 
@@ -54,6 +58,21 @@ class PackedLines:
         """
         lines = code_lines(coder, packed.lines if packed else None, confident=confident)
         return cls(lines, code_free_space(coder, packed.free if packed else None))
+
+    @classmethod
+    def code_changes(
+        cls, coder: Coder, before: "PackedLines", after: "PackedLines | None"
+    ) -> "PackedLines":
+        """Code what makes `before` `after`, or return what a decoder finds.
+
+        Raises
+        ------
+        ValueError
+            If there is too much of anything.
+        """
+        lines = code_changed_lines(coder, before.lines, after.lines if after else None)
+        free = code_changed_free_space(coder, before.free, after.free if after else None)
+        return cls(lines, free)
 
     def unpack(self, reach: float) -> LineMap:
         """Return the line map.
@@ -144,6 +163,60 @@ class PackedSubmap:
         """
         lines = self.lines.unpack(SUBMAP_REACH)
         return Submap(self.id, 0, np.zeros(3), lines, self.trajectory.restore(SUBMAP_REACH))
+
+
+def decode_submaps(decoder: Decoder) -> Iterator[PackedSubmap]:
+    """Yield the submaps that `SubmapStream` encoded.
+
+    Raises
+    ------
+    ValueError
+        If there is too much of anything.
+    """
+    clock = Clock()
+    for _ in range(MAX_SUBMAPS + 1):
+        if not decoder.bit(ANOTHER):
+            return
+        yield PackedSubmap.code(decoder, None, clock)
+    raise ValueError(f"more than {MAX_SUBMAPS} submaps")
+
+
+class SubmapStream:
+    """Encodes the submaps of a map as it grows: those that are as they were are coded once.
+
+    All but the last few settle, and the state of an encoder behind these is where the next one
+    goes on.
+    """
+
+    def __init__(self) -> None:
+        self._keys: list[tuple[int, bytes]] = []
+        self._stages: dict[int, tuple[Encoder, Clock]] = {}  # by number of submaps coded
+
+    def encoder(self, submaps: Sequence[PackedSubmap]) -> Encoder:
+        """Return an encoder, the caller's, that has coded `submaps`.
+
+        Raises
+        ------
+        ValueError
+            If there is too much of anything.
+        """
+        keys = [(packed.id, packed.digest) for packed in submaps]
+        same = next(
+            (k for k, (new, old) in enumerate(zip(keys, self._keys, strict=False)) if new != old),
+            min(len(keys), len(self._keys)),
+        )
+        stages = {k: stage for k, stage in self._stages.items() if k <= same}
+        begin = max(stages, default=0)
+        encoder, clock = stages.get(begin, (Encoder(), Clock()))
+        encoder, clock = encoder.copy(), replace(clock)
+        for number, packed in enumerate(submaps[begin:], start=begin + 1):
+            encoder.bit(ANOTHER, 1)
+            PackedSubmap.code(encoder, packed, clock)
+            if number > len(submaps) - STAGES:
+                stages[number] = encoder.copy(), replace(clock)
+        self._keys, self._stages = keys, {k: stages[k] for k in sorted(stages)[-STAGES:]}
+        encoder.bit(ANOTHER, 0)
+        return encoder
 
 
 def digest_of(columns: list[IntArray]) -> bytes:

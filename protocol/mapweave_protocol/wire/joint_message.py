@@ -1,5 +1,6 @@
 """A version of the joint map as a message."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import ClassVar, Self
 
@@ -7,6 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mapweave.maps import JointComponent, JointMap
+from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.alignment_message import WireAlignment
 from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.coding.entropy import Decoder, Encoder
@@ -28,34 +30,77 @@ from mapweave_protocol.wire.orders.order_message import MAX_ORDERS, WireOrder
 
 
 class WireComponent(WireModel):
-    """A component of the joint map; `stream` is its lines with their confidence."""
+    """A component of the joint map.
+
+    Attributes
+    ----------
+    robots
+        Where each component of a robot lies in it.
+    confidence
+        Of what joins them.
+    stream
+        Its lines with their confidence, or what changed of them.
+    before
+        A robot's component that names one of the version before, whose lines changed; None where
+        `stream` is all there is.
+    """
 
     robots: dict[ComponentName, JointTransform] = Field(min_length=1, max_length=MAX_ALIGNMENTS)
     confidence: Probability
     stream: bytes = Field(max_length=MAX_BYTES)
     marks: tuple[WirePlacedMark, ...] = Field(default=(), max_length=MAX_ALIGNMENTS)
+    before: ComponentName | None = None
 
     @classmethod
     def pack(cls, component: JointComponent) -> Self:
         """Return `component` for the wire."""
-        encoder = Encoder()
         lines = PackedLines.pack(component.map, JOINT_REACH, component.segment_confidence)
+        robots = {name: to_transform(pose) for name, pose in component.robots.items()}
+        marks = tuple(WirePlacedMark.pack(mark) for mark in component.marks)
+        return cls.of_lines(robots, round(float(component.confidence), 4), lines, marks)
+
+    @classmethod
+    def of_lines(
+        cls,
+        robots: dict[str, JointTransform],
+        confidence: float,
+        lines: PackedLines,
+        marks: tuple[WirePlacedMark, ...],
+    ) -> Self:
+        """Return the component of these lines, whole."""
+        encoder = Encoder()
         PackedLines.code(encoder, lines, confident=True)
-        return cls(
-            robots={name: to_transform(pose) for name, pose in component.robots.items()},
-            confidence=round(float(component.confidence), 4),
-            stream=encoder.finish(),
-            marks=tuple(WirePlacedMark.pack(mark) for mark in component.marks),
-        )
+        return cls(robots=robots, confidence=confidence, stream=encoder.finish(), marks=marks)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        self.unpack()
+        if self.before is None:
+            self.unpack()
         return self
 
     @cached_property
-    def _lines(self) -> PackedLines:
+    def lines(self) -> PackedLines:
+        """What `stream` says, if that is all there is."""
+        if self.before is not None:
+            raise ValueError("what changed of a component, expected all of it")
         return PackedLines.code(Decoder(self.stream), None, confident=True)
+
+    def since(self, name: str, before: Self) -> Self:
+        """Return what makes the component `before`, which holds `name`, this one."""
+        encoder = Encoder()
+        PackedLines.code_changes(encoder, before.lines, self.lines)
+        return self.model_copy(update={"stream": encoder.finish(), "before": name})
+
+    def over(self, before: Self) -> Self:
+        """Return this component whole, if it is what changed of `before`.
+
+        Raises
+        ------
+        ValueError
+            If its stream is damaged.
+        """
+        lines = PackedLines.code_changes(Decoder(self.stream), before.lines, None)
+        return self.of_lines(self.robots, self.confidence, lines, self.marks)
 
     def unpack(self) -> JointComponent:
         """Return the component.
@@ -65,20 +110,20 @@ class WireComponent(WireModel):
         ValueError
             If its stream is damaged.
         """
-        certainties = self._lines.lines.confidence
+        certainties = self.lines.lines.confidence
         if certainties is None:
             raise ValueError("segments without a confidence")
         return JointComponent(
             robots={name: np.array(pose) for name, pose in self.robots.items()},
             confidence=self.confidence,
-            map=self._lines.unpack(JOINT_REACH),
+            map=self.lines.unpack(JOINT_REACH),
             segment_confidence=certainties / CERTAINTIES,
             marks=tuple(mark.unpack() for mark in self.marks),
         )
 
 
 class JointMapMessage(Message):
-    """A version of the joint map, complete.
+    """A version of the joint map, complete or what changed since the one before.
 
     Attributes
     ----------
@@ -86,6 +131,12 @@ class JointMapMessage(Message):
         Names the store that counts these versions; another store counts from 1 again.
     version
         1, 2, 3…
+    alignments
+        All of them, or those that changed.
+    changes
+        Whether it is what changed since the version before.
+    gone
+        Of which components alignments are no longer there.
     """
 
     letter: ClassVar[bytes] = b"j"
@@ -97,6 +148,10 @@ class JointMapMessage(Message):
     components: tuple[WireComponent, ...] = Field(max_length=MAX_ALIGNMENTS)
     alignments: tuple[WireAlignment, ...] = Field(max_length=MAX_ALIGNMENTS)
     orders: tuple[WireOrder, ...] = Field(default=(), max_length=MAX_ORDERS)
+    changes: bool = False
+    gone: tuple[tuple[ComponentName, ComponentName], ...] = Field(
+        default=(), max_length=MAX_ALIGNMENTS
+    )
 
     @classmethod
     def pack(cls, joint: JointMap, series: str) -> Self:
@@ -109,11 +164,102 @@ class JointMapMessage(Message):
             orders=tuple(WireOrder.pack(order) for order in joint.orders),
         )
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.changes and (self.gone or any(c.before for c in self.components)):
+            raise ValueError("said to be complete, but only what changed is there")
+        return self
+
+    def since(self, before: Self) -> Self:
+        """Return what changed since the version `before`, both complete.
+
+        Raises
+        ------
+        ValueError
+            If it is not the version before.
+        """
+        self._check_follows(before)
+        told, now = _by_names(before.alignments), _by_names(self.alignments)
+        return type(self)(
+            series=self.series,
+            version=self.version,
+            components=tuple(_since(component, before.components) for component in self.components),
+            alignments=tuple(a for names, a in now.items() if told.get(names) != a),
+            orders=self.orders,
+            changes=True,
+            gone=tuple(names for names in told if names not in now),
+        )
+
+    def over(self, before: Self) -> Self:
+        """Return this version, of which this is what changed since `before`, complete.
+
+        Raises
+        ------
+        MessageError
+            If it is not the version before, or does not go with it.
+        """
+        try:
+            self._check_follows(before)
+            alignments = _by_names(before.alignments) | _by_names(self.alignments)
+            return type(self)(
+                series=self.series,
+                version=self.version,
+                components=tuple(_over(c, before.components) for c in self.components),
+                alignments=tuple(a for names, a in alignments.items() if names not in self.gone),
+                orders=self.orders,
+            )
+        except ValueError as error:
+            raise MessageError(self.format, f"version {self.version}: {error}") from error
+
     def unpack(self) -> JointMap:
-        """Return the joint map."""
+        """Return the joint map; of a complete message.
+
+        Raises
+        ------
+        MessageError
+            If it is what changed.
+        """
+        if self.changes:
+            raise MessageError(self.format, "what changed, expected a complete version")
         return JointMap(
             self.version,
             tuple(component.unpack() for component in self.components),
             tuple(alignment.unpack() for alignment in self.alignments),
             orders=tuple(order.unpack() for order in self.orders),
         )
+
+    def follows(self, before: Self) -> bool:
+        """Tell whether `before` is the version before this one, complete."""
+        version = before.series, before.version + 1, before.changes
+        return version == (self.series, self.version, False)
+
+    def _check_follows(self, before: Self) -> None:
+        if not self.follows(before):
+            raise ValueError(f"expected version {self.version - 1} of {self.series} before it")
+
+
+def _since(component: WireComponent, others: Sequence[WireComponent]) -> WireComponent:
+    """Return what changed of `component`, or all of it where that is no more."""
+    for name in component.robots:
+        before = _with(name, others)
+        if before is not None and before.lines.lines.turn == component.lines.lines.turn:
+            changed = component.since(name, before)
+            return changed if len(changed.stream) < len(component.stream) else component
+    return component
+
+
+def _over(component: WireComponent, others: Sequence[WireComponent]) -> WireComponent:
+    if component.before is None:
+        return component
+    before = _with(component.before, others)
+    if before is None:
+        raise ValueError(f"{component.before} was in no component before")
+    return component.over(before)
+
+
+def _with(name: str, components: Sequence[WireComponent]) -> WireComponent | None:
+    return next((one for one in components if name in one.robots), None)
+
+
+def _by_names(alignments: Sequence[WireAlignment]) -> dict[tuple[str, str], WireAlignment]:
+    return {(alignment.reference, alignment.other): alignment for alignment in alignments}

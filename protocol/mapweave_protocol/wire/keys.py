@@ -118,4 +118,4 @@ def everything(team: str) -> str:
 
 def new_boot() -> str:
     """Return a fresh name for this run of a robot, or this start of a coordinator."""
-    return secrets.token_hex(6)
+    return secrets.token_hex(4)  # of the few runs of one robot; it is in most messages

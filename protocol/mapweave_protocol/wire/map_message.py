@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import ClassVar, Self, TypeVar
+from typing import ClassVar, Self, TypeVar, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,12 +15,13 @@ from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire import packing
 from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.coding.entropy import Coder, Decoder, Encoder
-from mapweave_protocol.wire.coding.trajectory_code import Clock
 from mapweave_protocol.wire.geometry import (
     DIGEST_SIZE,
     MAX_BYTES,
     MAX_SUBMAPS,
     PackedSubmap,
+    SubmapStream,
+    decode_submaps,
     digest_of,
 )
 from mapweave_protocol.wire.model import WORLD_REACH, Count, Id, Message
@@ -28,6 +29,7 @@ from mapweave_protocol.wire.model import WORLD_REACH, Count, Id, Message
 MAX_COMPONENT = 99_999
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,27 +90,35 @@ class Changes:
     places: tuple[Place, ...]
     submaps: tuple[PackedSubmap, ...]
 
-    @classmethod
-    def code(cls, coder: Coder, changes: "Changes | None") -> Self:
-        """Code `changes` with an encoder, or return what a decoder finds.
+    def encode(self, stream: SubmapStream) -> bytes:
+        """Return the bytes of it.
 
         Raises
         ------
         ValueError
             If there is too much of anything.
         """
-        given = changes or cls((), (), ())
-        gone = coder.count("gone", MAX_SUBMAPS, len(given.gone))
-        left = [coder.count("gone id", MAX_SUBMAPS - 1, n) for n in _padded(given.gone, gone, 0)]
-        count = coder.count("places", MAX_SUBMAPS, len(given.places))
-        places = _code_places(coder, _padded(given.places, count, None))
-        count = coder.count("submaps", MAX_SUBMAPS, len(given.submaps))
-        clock = Clock()
-        submaps = [
-            PackedSubmap.code(coder, packed, clock)
-            for packed in _padded(given.submaps, count, None)
-        ]
-        return cls(tuple(left), tuple(places), tuple(submaps))
+        encoder = stream.encoder(self.submaps)
+        self.code_places(encoder)
+        return encoder.finish()
+
+    def code_places(self, encoder: Encoder) -> None:
+        """Code all but the submaps, after these."""
+        _code_gone(encoder, self.gone)
+        _code_places(encoder, self.places)
+
+    @classmethod
+    def decode(cls, data: bytes) -> Self:
+        """Return what `encode` gave `data` for.
+
+        Raises
+        ------
+        ValueError
+            If there is too much of anything.
+        """
+        decoder = Decoder(data)
+        submaps = tuple(decode_submaps(decoder))
+        return cls(_code_gone(decoder, ()), _code_places(decoder, ()), submaps)
 
 
 class MapMessage(Message):
@@ -139,7 +149,15 @@ class MapMessage(Message):
     def pack(cls, robot_map: RobotMap) -> Self:
         """Return the complete message of `robot_map`."""
         packed = [PackedSubmap.pack(submap) for submap in robot_map.submaps]
-        return cls.of_packed(robot_map, packed, {submap.id for submap in packed})
+        return cls.whole(robot_map, packed, SubmapStream())
+
+    @classmethod
+    def whole(
+        cls, robot_map: RobotMap, packed: Sequence[PackedSubmap], stream: SubmapStream
+    ) -> Self:
+        """Return the complete message of `robot_map`; parameters and errors as of `of_packed`."""
+        everything = {submap.id for submap in packed}
+        return cls.of_packed(robot_map, packed, everything, stream=stream)
 
     @classmethod
     def of_packed(
@@ -148,6 +166,7 @@ class MapMessage(Message):
         packed: Sequence[PackedSubmap],
         include: Set[int],
         held: Mapping[int, Place] | None = None,
+        stream: SubmapStream | None = None,
     ) -> Self:
         """Return the message of `robot_map` with the geometry of the submaps `include`.
 
@@ -157,6 +176,8 @@ class MapMessage(Message):
             The geometry of all submaps of `robot_map`, in their order.
         held
             Where receivers have them; None makes it complete.
+        stream
+            Codes what it coded the last time no more; None codes all.
 
         Raises
         ------
@@ -169,14 +190,17 @@ class MapMessage(Message):
         moved = tuple(place for place in places if before.get(place.id) != place)
         geometry = tuple(submap for submap in packed if submap.id in include)
         changes = Changes(tuple(sorted(gone)), moved, geometry)
-        return cls(
+        message = cls.model_construct(
             robot=robot_map.robot,
             boot=robot_map.boot,
             version=robot_map.version,
             complete=held is None,
             state=state_of(zip(places, (submap.digest for submap in packed), strict=True)),
-            stream=_encoded(changes),
+            stream=_encoded(changes, stream or SubmapStream()),
         )
+        # What was packed here is in order, and need not be decoded to see it.
+        message.__dict__["changes"] = changes
+        return cast("Self", message)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -203,7 +227,7 @@ class MapMessage(Message):
         ValueError
             If the stream is damaged.
         """
-        return Changes.code(Decoder(self.stream), None)
+        return Changes.decode(self.stream)
 
 
 def state_of(submaps: Iterable[tuple[Place, bytes]]) -> bytes:
@@ -215,33 +239,44 @@ def state_of(submaps: Iterable[tuple[Place, bytes]]) -> bytes:
     return digest_of([np.array(rows, dtype=np.int64).reshape(-1, 7)])
 
 
-def _encoded(changes: Changes) -> bytes:
-    encoder = Encoder()
+def _encoded(changes: Changes, stream: SubmapStream) -> bytes:
     try:
-        Changes.code(encoder, changes)
+        data = changes.encode(stream)
     except ValueError as error:
         raise MessageError(MapMessage.format, str(error)) from error
-    return encoder.finish()
+    if len(data) > MAX_BYTES:
+        raise MessageError(MapMessage.format, f"{len(data)} bytes, expected at most {MAX_BYTES}")
+    return data
 
 
-def _code_places(coder: Coder, given: Iterable[Place | None]) -> Iterable[Place]:
+def _code_gone(coder: Coder, given: Sequence[int]) -> tuple[int, ...]:
+    """Code ids."""
+    count = coder.count("gone", MAX_SUBMAPS, len(given))
+    return tuple(coder.count("gone id", MAX_SUBMAPS - 1, n) for n in _padded(given, count, 0))
+
+
+def _code_places(coder: Coder, given: Sequence[Place]) -> tuple[Place, ...]:
     """Code where submaps lie, each from the one before."""
+    count = coder.count("places", MAX_SUBMAPS, len(given))
     last = Place(-1, 0, 0, 0, 0)
-    for place in given:
-        to = place or last
-        submap = (
-            last.id + 1 + coder.count("place", MAX_SUBMAPS, to.id - last.id - 1 if place else 0)
-        )
-        component = last.component + coder.signed("component", to.component - last.component)
-        if not (0 <= component <= MAX_COMPONENT and submap < MAX_SUBMAPS):
-            raise ValueError(f"component {component} of submap {submap}, expected others")
-        x = last.x + coder.signed("x", to.x - last.x)
-        y = last.y + coder.signed("y", to.y - last.y)
-        heading = last.heading + coder.signed("heading", to.heading - last.heading)
-        last = Place(submap, component, x, y, heading)
-        yield last
+    places = []
+    for place in _padded(given, count, None):
+        last = _code_place(coder, place or last, last)
+        places.append(last)
+    return tuple(places)
 
 
-def _padded(given: Sequence[T], count: int, filling: T) -> Iterable[T]:
+def _code_place(coder: Coder, place: Place, last: Place) -> Place:
+    submap = last.id + 1 + coder.count("place", MAX_SUBMAPS, max(place.id - last.id - 1, 0))
+    component = last.component + coder.signed("component", place.component - last.component)
+    if not (0 <= component <= MAX_COMPONENT and submap < MAX_SUBMAPS):
+        raise ValueError(f"component {component} of submap {submap}, expected others")
+    x = last.x + coder.signed("x", place.x - last.x)
+    y = last.y + coder.signed("y", place.y - last.y)
+    heading = last.heading + coder.signed("turn of place", place.heading - last.heading)
+    return Place(submap, component, x, y, heading)
+
+
+def _padded(given: Sequence[T], count: int, filling: U) -> Iterable[T | U]:
     """Return `given`, or from a decoder so many fillings."""
     return given or (filling for _ in range(count))

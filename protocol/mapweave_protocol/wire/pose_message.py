@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave_protocol.wire.budget import KIB, Budget
 from mapweave_protocol.wire.model import (
@@ -23,7 +24,7 @@ from mapweave_protocol.wire.model import (
     WireModel,
 )
 
-Covariance = Annotated[tuple[Number, ...], Field(min_length=9, max_length=9)]
+Covariance = Annotated[tuple[Number, ...], Field(min_length=6, max_length=6)]
 
 
 class JointPose(WireModel):
@@ -37,14 +38,11 @@ class JointPose(WireModel):
         The first version of the joint map in which the robot's component was in this frame.
     pose
         [m, m, rad] joint frame.
-    covariance
-        As of `PoseMessage`, joint frame.
     """
 
     frame: ComponentName
     since: Count
     pose: JointTransform
-    covariance: Covariance
 
 
 class PoseMessage(Message):
@@ -65,8 +63,9 @@ class PoseMessage(Message):
     pose
         [m, m, rad] of the sensor, in the component's frame.
     covariance
-        (3, 3) of it by rows [m, m, rad]: of the scan against what was mapped lately. What adds up
-        over a path is not in it, nor how well components are joined.
+        Of it, in the component's frame, the upper triangle by rows [m, m, rad]: of the scan against
+        what was mapped lately. What adds up over a path is not in it, nor how well components are
+        joined. `covariance_matrix` gives it whole, in either frame.
     joint
         The same in the joint frame; None while the joint map does not have the component.
     """
@@ -86,7 +85,26 @@ class PoseMessage(Message):
     covariance: Covariance
     joint: JointPose | None = None
 
+    def covariance_matrix(self, *, joint: bool = False) -> FloatArray:
+        """Return the ``(3, 3)`` covariance [m, m, rad], in the joint frame where that is asked for.
+
+        Raises
+        ------
+        ValueError
+            If the joint frame is asked for while there is none.
+        """
+        matrix = np.empty((3, 3))
+        matrix[np.triu_indices(3)] = self.covariance
+        matrix.T[np.triu_indices(3)] = self.covariance
+        if not joint:
+            return matrix
+        if self.joint is None:
+            raise ValueError("the robot is in no joint frame")
+        to_joint = np.eye(3)
+        to_joint[:2, :2] = se2.rotation(self.joint.pose[2] - self.pose[2])
+        return np.asarray(to_joint @ matrix @ to_joint.T)
+
 
 def to_covariance(matrix: FloatArray) -> tuple[float, ...]:
-    """Return the ``(3, 3)`` `matrix` by rows, as plain numbers of no more digits than matter."""
-    return tuple(float(f"{number:.3g}") for number in np.asarray(matrix).ravel())
+    """Return the upper triangle of ``(3, 3)`` `matrix`, to the digits that mean anything."""
+    return tuple(float(f"{number:.2g}") for number in np.asarray(matrix)[np.triu_indices(3)])

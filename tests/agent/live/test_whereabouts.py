@@ -61,7 +61,7 @@ def test_once_joined_it_is_in_the_joint_frame_too_and_its_covariance_is_turned()
     assert (message.joint.frame, message.joint.since) == ("r1/0", 3)
     np.testing.assert_allclose(message.joint.pose, [9.0, 8.0, 0.4 + np.pi / 2], atol=1e-6)
     expected = np.diag([0.02**2, 0.3**2, 0.01**2])
-    np.testing.assert_allclose(np.reshape(message.joint.covariance, (3, 3)), expected, atol=1e-7)
+    np.testing.assert_allclose(message.covariance_matrix(joint=True), expected, atol=1e-5)
 
 
 def test_at_a_merge_and_at_an_unmerge_the_frame_changes_once_and_it_is_said(

@@ -70,7 +70,8 @@ def test_words_name_the_files_which_are_there(arena: Run) -> None:
 def test_words_count_what_each_robot_sent_and_its_scans_as_a_grid(arena: Run) -> None:
     for robot in ("r1", "r2"):
         assert re.search(
-            rf"  {robot}: [\d.]+ kB: [\d.]+ kB in \d+ map messages,.*\n"
+            rf"  {robot}: [\d.]+ kB, \d+ B a metre: map \d+ B in \d+ messages,.*\n"
+            r" +the same drive as scans every 0.5 m, deflated: [\d.]+ kB, \d+ B a metre\n"
             r" +the same scans as an occupancy grid of 5 cm, once: [\d.]+ kB, deflated",
             arena.said,
         )

@@ -150,7 +150,7 @@ def make_pose(robot: str, x: float, *, found: bool = True) -> PoseMessage:
     """Return a robot's word that it is at `x` [m] of its component 0."""
     return PoseMessage(
         robot=robot, boot="b", stamp=None, sent=9.0, scan_index=0, found=found,
-        component=f"{robot}/0", pose=(x, 0.0, 0.0), covariance=(0.0,) * 9,
+        component=f"{robot}/0", pose=(x, 0.0, 0.0), covariance=(0.0,) * 6,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from mapweave_protocol.link.assembler import (
     MapAssembler,
     MapSender,
 )
-from mapweave_protocol.wire.codec import decode
+from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.messages import MapMessage
 
 MakeMap = Callable[..., RobotMap]
@@ -51,6 +51,12 @@ def plain(robot_map: RobotMap) -> list[object]:
 def sent_by(maps: list[RobotMap]) -> list[MapMessage]:
     sender = MapSender()
     return [decode(MapMessage, sender.payload(robot_map)) for robot_map in maps]
+
+
+def test_a_whole_map_is_the_same_bytes_whatever_of_it_was_coded_before(random_map: MakeMap) -> None:
+    sender = MapSender()
+    for robot_map in drive(random_map, np.random.default_rng(5), 12):
+        assert sender.whole(robot_map) == encode(MapMessage.pack(robot_map))
 
 
 def test_a_sender_knows_its_map_as_it_arrives(random_map: MakeMap) -> None:

@@ -79,8 +79,8 @@ def joint_status() -> JointStatusMessage:
 
 
 def pose() -> PoseMessage:
-    covariance = tuple(float(n) for n in range(9))
-    joint = JointPose(frame="a/0", since=3, pose=(4.0, 5.0, 6.0), covariance=covariance)
+    covariance = tuple(float(n) for n in range(6))
+    joint = JointPose(frame="a/0", since=3, pose=(4.0, 5.0, 6.0))
     return PoseMessage(
         robot="b", boot="b1", stamp=1.7e9, sent=1.7e9, scan_index=7, found=True, component="b/1",
         pose=(1.0, 2.0, 3.0), covariance=covariance, joint=joint,

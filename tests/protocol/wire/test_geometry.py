@@ -56,7 +56,7 @@ def test_walls_arrive_within_a_centimetre_polyline_by_polyline(
         )
         support = np.maximum(before.support, 1)
         ratio = np.maximum(after.support[became], 1) / support
-        assert (ratio <= 1.5).all() and (ratio >= 2 / 3).all()
+        assert (ratio <= 2).all() and (ratio >= 1 / 2).all()
         assert np.array_equal(before.support == 0, after.support[became] == 0)
 
 

@@ -1,13 +1,18 @@
 """Whole numbers as few bytes: an adaptive binary range coder, and its decoder.
 
 A number is a string of binary decisions, each with a context of its own in which the coder counts
-how often either came out: what is usual costs a fraction of a bit. Both ends count alike, so no
-table travels. Encoder and decoder are walked through the same code: a function that codes a thing
-takes the thing from an encoder's caller, and from a decoder gives it back.
+how often either came out: what is usual costs a fraction of a bit. Both ends count alike, beginning
+with what is usual in maps (``usual.txt``), so no table travels. Encoder and decoder are walked
+through the same code: a function that codes a thing takes the thing from an encoder's caller, and
+from a decoder gives it back.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
+from copy import copy
+from functools import cache
+from importlib.resources import files
+from typing import Self, TypeAlias
 
 MAX_BITS = 62  # of a number's magnitude
 MOST_COUNTED = 500  # of one context, then both counts are halved: what is usual may change
@@ -19,9 +24,16 @@ _MASK = 0xFFFFFFFF
 _PRECISION = 15  # bits of a probability
 _FLUSHED = 5  # bytes
 
+Beginning: TypeAlias = Mapping[str, tuple[int, int]]
+
 
 class Coder(ABC):
     """What encoder and decoder have in common: a context's counts, and what numbers are made of.
+
+    Parameters
+    ----------
+    beginning
+        By name of context, the counts of 0 and 1 with which it begins; by default `usual`.
 
     Attributes
     ----------
@@ -29,8 +41,9 @@ class Coder(ABC):
         How many numbers have passed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, beginning: Beginning | None = None) -> None:
         self.numbers = 0
+        self._beginning = usual() if beginning is None else beginning
         self._range = _MASK
         self._counts: dict[Hashable, list[int]] = {}
 
@@ -89,7 +102,10 @@ class Coder(ABC):
         return found
 
     def _counted(self, context: Hashable) -> list[int]:
-        return self._counts.setdefault(context, [1, 1])
+        counts = self._counts.get(context)
+        if counts is None:
+            counts = self._counts[context] = list(self._beginning.get(name_of(context), (1, 1)))
+        return counts
 
     def _split(self, counts: list[int]) -> int:
         """Return the part of the range that means 1."""
@@ -100,8 +116,8 @@ class Coder(ABC):
 class Encoder(Coder):
     """Turns numbers into bytes."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, beginning: Beginning | None = None) -> None:
+        super().__init__(beginning)
         self._low = 0
         self._held: int | None = None  # a byte that a carry may still change
         self._pending = 0  # bytes of 255 after it
@@ -134,11 +150,20 @@ class Encoder(Coder):
         Zeros at the end are left off, as a decoder adds them, but for those that allow for the
         number of numbers.
         """
+        # Of the numbers that mean the same, the one that ends in most zeros.
+        self._low = (self._low + _TOP - 1) & -_TOP
         for _ in range(_FLUSHED):
             self._shift()
         payload = bytes(self._bytes).rstrip(b"\0")
         least = -((NUMBERS_OF_NONE - self.numbers) // NUMBERS_OF_A_BYTE)
         return payload.ljust(least, b"\0") if least > 0 else payload
+
+    def copy(self) -> Self:
+        """Return an encoder that goes on from here, as this one may as well."""
+        other = copy(self)
+        other._counts = {context: counts.copy() for context, counts in self._counts.items()}
+        other._bytes = self._bytes.copy()
+        return other
 
     def _spend(self) -> None:
         self.numbers += 1
@@ -166,8 +191,8 @@ class Encoder(Coder):
 class Decoder(Coder):
     """Turns bytes into numbers; what is not from an encoder gives other numbers, or an error."""
 
-    def __init__(self, data: bytes) -> None:
-        super().__init__()
+    def __init__(self, data: bytes, beginning: Beginning | None = None) -> None:
+        super().__init__(beginning)
         self._data = data
         self._allowed = min(MAX_NUMBERS, NUMBERS_OF_NONE + NUMBERS_OF_A_BYTE * len(data))
         self._at = 4
@@ -207,6 +232,21 @@ class Decoder(Coder):
             following = self._data[self._at] if self._at < len(self._data) else 0
             self._code = (self._code << 8 | following) & _MASK
             self._at += 1
+
+
+@cache
+def usual() -> Beginning:
+    """Return by name of context with which counts of 0 and 1 it begins; others begin with 1, 1."""
+    text = files(__package__).joinpath("usual.txt").read_text(encoding="ascii")
+    rows = (line.rsplit(maxsplit=2) for line in text.splitlines())
+    return {name: (int(zeros), int(ones)) for name, zeros, ones in rows}
+
+
+def name_of(context: Hashable) -> str:
+    """Return the parts of a context in a row, such as ``aside 1 0 3``."""
+    if isinstance(context, tuple):
+        return " ".join(name_of(part) for part in context)
+    return context if isinstance(context, str) else str(int(context))  # type: ignore[call-overload]
 
 
 def _learn(counts: list[int], value: int) -> None:

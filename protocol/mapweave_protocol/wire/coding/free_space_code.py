@@ -17,7 +17,8 @@ from mapweave_protocol.wire.coding.entropy import Coder
 from mapweave_protocol.wire.coding.line_code import code_quarter, turned, turned_back
 
 PER_METRE = 4  # a step of 0.25 m: no corner moves by more than 0.18 m
-DEVIATION = 0.2  # [m] by which an outline is straightened before
+DEPTH = 0.3  # [m]: `clearance`; what is nowhere that deep counts against no wall
+DEVIATION = 0.25  # [m] by which an outline is straightened before
 MAX_VERTICES = 400_000  # of one line map
 
 Outline: TypeAlias = tuple[IntArray, ...]
@@ -47,7 +48,7 @@ class CodedFreeSpace:
 
         packing.quantise(np.concatenate(rings), 1.0, reach)
         steps = [turned(ring, turn) * PER_METRE for ring in rings]
-        return cls(straightened(steps, DEVIATION * PER_METRE))
+        return cls(straightened(steps, DEPTH * PER_METRE, DEVIATION * PER_METRE))
 
     def restore(self, turn: int, reach: float) -> tuple[FloatArray, ...]:
         """Return simple polygons without holes that cover the areas [m].

@@ -20,7 +20,7 @@ from mapweave_protocol.wire.coding.entropy import Coder
 
 PER_METRE = 73  # a step of 13.7 mm: no point moves by more than 9.7 mm
 TURNS = 512  # directions of the frame told apart, in a quarter turn
-SUPPORTS = (0, 1, 2, 3, 5, 8, 16, 32, 64, 128, 256, 512, 1024, 4096, 65536, 2**31)
+SUPPORTS = (0, 1, 2, 3, 8, 32, 128, 512, 2048, 8192, 65536, 2**31)  # 2 make a wall count in full
 CERTAINTIES = 50  # steps of a segment's confidence
 MAX_SEGMENTS = 200_000  # of one line map
 
@@ -115,7 +115,7 @@ def code_lines(coder: Coder, lines: CodedLines | None, *, confident: bool) -> Co
     """
     turn = coder.count("turn", TURNS - 1, lines.turn if lines else 0)
     polylines = coder.count("polylines", MAX_SEGMENTS, len(lines.counts) if lines else 0)
-    given = _rows(lines) if lines else None
+    given = rows_of(lines) if lines else None
     walk = _Walk(coder, confident=confident)
     counts: list[int] = []
     for number in range(polylines):
@@ -137,13 +137,17 @@ class _Walk:
         self._confident = confident
         self._end = (0, 0)
         self._quarter = 0
+        self._joint = 0  # 0: a polyline begins; 1: ends touch; 2 to 4: apart, ahead or to a side
+        self._support = 0
 
     def step(self, *, first: bool, row: tuple[int, ...] | None) -> None:
         """Code the next segment, its support and its confidence; `first` of its polyline."""
         x1, y1, x2, y2 = row[:4] if row else (0, 0, 0, 0)
         x1, y1 = self._start((x1, y1), first=first)
         x2, y2, size = self._way(x1, y1, (x2, y2), first=first)
-        support = self._coder.count(("support", size), len(SUPPORTS) - 1, row[4] if row else 0)
+        context = "support", self._support, size
+        support = self._coder.count(context, len(SUPPORTS) - 1, row[4] if row else 0)
+        self._support = support
         confidence = 0
         if self._confident:
             confidence = self._coder.count("confidence", CERTAINTIES, row[5] if row else 0)
@@ -155,14 +159,18 @@ class _Walk:
         x, y = self._end
         ahead, aside = turned_back(self._quarter, start[0] - x, start[1] - y)
         ahead = self._coder.signed(("ahead", first), ahead)
-        aside = self._coder.signed(("aside", first, min(2, abs(ahead).bit_length() // 3)), aside)
+        aside = self._coder.signed(("aside", first, min(3, abs(ahead).bit_length() // 2)), aside)
+        if first:
+            self._joint = 0
+        else:
+            self._joint = 2 + (aside > 0) + 2 * (aside < 0) if ahead or aside else 1
         dx, dy = turned_back(-self._quarter, ahead, aside)
         return x + dx, y + dy
 
     def _way(self, x: int, y: int, end: tuple[int, int], *, first: bool) -> tuple[int, int, int]:
         """Code where a segment that starts at `x`, `y` ends; return it and the size in bits."""
         dx, dy = end[0] - x, end[1] - y
-        self._quarter = code_quarter(self._coder, ("turn", first), self._quarter, dx, dy)
+        self._quarter = code_quarter(self._coder, ("turn", self._joint), self._quarter, dx, dy)
         ahead, aside = turned_back(self._quarter, dx, dy)
         ahead = self._coder.unsigned(("length", first), ahead)
         size = ahead.bit_length()
@@ -185,7 +193,8 @@ def turned_back(quarter: int, x: int, y: int) -> tuple[int, int]:
     return ((x, y), (y, -x), (-x, -y), (-y, x))[quarter % 4]
 
 
-def _rows(lines: CodedLines) -> Iterator[tuple[int, ...]]:
+def rows_of(lines: CodedLines) -> Iterator[tuple[int, ...]]:
+    """Yield of each segment its ends, support and confidence, 0 where there is none."""
     confidence = np.zeros_like(lines.support) if lines.confidence is None else lines.confidence
     rows = np.column_stack([lines.segments, lines.support, confidence])
     return (tuple(row) for row in rows.tolist())

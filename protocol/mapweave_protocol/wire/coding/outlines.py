@@ -11,12 +11,14 @@ from mapweave.scan.free_space import from_rings, rings
 
 
 def straightened(
-    outlines: Sequence[FloatArray], deviation: float
+    outlines: Sequence[FloatArray], depth: float, deviation: float
 ) -> tuple[tuple[IntArray, ...], ...]:
     """Return the areas that simple polygons (k, 2) cover, their corners on whole numbers.
 
     Parameters
     ----------
+    depth
+        What is nowhere that deep is left out, such as a tongue between two beams.
     deviation
         By which an outline may be straightened, in the unit of the polygons.
 
@@ -25,7 +27,11 @@ def straightened(
     tuple of tuple of IntArray
         Of each area the outside, then its holes, each (k, 2).
     """
-    simple = shapely.simplify(from_rings(outlines), deviation)
+    # GEOS divides by nothing at some corners of a mitre, and goes on with what is right.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        deep = shapely.buffer(from_rings(outlines), -depth, join_style="mitre")
+        wide = shapely.buffer(deep, depth, join_style="mitre", mitre_limit=2.0)
+    simple = shapely.simplify(wide, deviation)
     whole = shapely.simplify(shapely.set_precision(simple, 1.0), 0.0)
     areas = [p for p in shapely.get_parts(whole) if isinstance(p, Polygon) and not p.is_empty]
     return tuple(

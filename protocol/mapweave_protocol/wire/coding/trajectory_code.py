@@ -19,7 +19,7 @@ from mapweave_protocol.wire.coding.line_code import turned_back
 
 PER_METRE = 36  # a step of 28 mm: no scan moves by more than 20 mm
 PER_TURN = 912  # a step of 0.39°: no heading turns by more than 0.2°
-PER_SECOND = 20  # [1/s]: a step of 50 ms; which scan it is says its index
+PER_SECOND = 10  # [1/s]: a step of 0.1 s; which scan it is says its index
 MAX_SCANS = 100_000  # of one submap
 MAX_INDEX = 2**53
 _FINE = 64  # parts of a step in which a motion is carried on

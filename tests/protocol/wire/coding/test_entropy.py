@@ -1,9 +1,12 @@
 """What an encoder was given a decoder finds, and few bytes do not unfold into much."""
 
+from collections.abc import Callable, Hashable
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapweave.maps import RobotMap
 from mapweave_protocol.wire.coding.entropy import (
     MAX_BITS,
     NUMBERS_OF_A_BYTE,
@@ -11,8 +14,13 @@ from mapweave_protocol.wire.coding.entropy import (
     Coder,
     Decoder,
     Encoder,
+    name_of,
+    usual,
 )
+from mapweave_protocol.wire.coding.trajectory_code import Clock
+from mapweave_protocol.wire.geometry import PackedSubmap
 
+MakeMap = Callable[..., RobotMap]
 NUMBERS = st.lists(st.tuples(st.sampled_from("ab"), st.integers(-(2**60), 2**60)), max_size=60)
 SMALL = st.lists(st.tuples(st.sampled_from("ab"), st.integers(-3, 3)), max_size=300)
 
@@ -40,6 +48,33 @@ def test_what_is_usual_costs_next_to_nothing() -> None:
     for _ in range(900):
         encoder.unsigned("same", 0)
     assert len(encoder.finish()) < 20
+
+
+def test_what_a_context_begins_with_is_as_if_it_had_been_seen() -> None:
+    sizes = []
+    for beginning in ({}, {"same 0": (1, 23)}):
+        encoder = Encoder(beginning)
+        encoder.unsigned("same", 6)
+        sizes.append(encoder.finish())
+        decoder = Decoder(sizes[-1], beginning)
+        assert decoder.unsigned("same") == 6
+    assert len(sizes[1]) <= len(sizes[0])
+
+
+def test_the_counts_that_are_usual_are_of_contexts_that_maps_have(random_map: MakeMap) -> None:
+    found = set[str]()
+
+    class Named(Encoder):
+        def bit(self, context: Hashable, value: int = 0) -> int:
+            found.add(name_of(context))
+            return super().bit(context, value)
+
+    for seed in range(20):
+        for submap in random_map(seed).submaps:
+            PackedSubmap.code(Named(), PackedSubmap.pack(submap), Clock())
+    kinds = {name.split()[0] for name in usual()}
+    assert {name.split()[0] for name in found} <= kinds
+    assert all(zeros > 0 and ones > 0 for zeros, ones in usual().values())
 
 
 def until_refused(coder: Coder) -> int:
