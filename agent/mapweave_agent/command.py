@@ -1,6 +1,7 @@
 """``mapweave agent``: the process of one robot."""
 
 import argparse
+import gc
 import logging
 import math
 import sys
@@ -135,6 +136,7 @@ def _run(options: argparse.Namespace) -> int:
 def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> None:
     """Run on the scans chosen: a recording is played at a rate, others come when they come."""
     stopping = stop_on_signal()
+    gc.freeze()  # what is loaded by now stays: collecting it again and again holds scans up
     if source.live:
         skipping = not math.isinf(options.rate)
         with scans_of(source, options.scans, skipping=skipping) as scans:

@@ -1,5 +1,6 @@
 """What a scan costs, stage by stage, beside small_gicp's ICP on the same scans."""
 
+import gc
 import importlib
 import time
 from collections import defaultdict
@@ -163,6 +164,7 @@ STAGES = ("observe", "track", "merge", "submap")
 def map_timed(scans: Sequence[Scan], package: ModuleType | None = None) -> Mapped:
     """Map `scans`, and have small_gicp follow them in turn."""
     mapper, peer = TimedMapper(), Gicp(package) if package else None
+    gc.freeze()  # as the commands do that map
     for first in range(0, len(scans), TURN_BY_TURN):
         part = scans[first : first + TURN_BY_TURN]
         for scan in part:

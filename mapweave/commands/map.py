@@ -1,6 +1,7 @@
 """``mapweave map``: a laser log to a robot's map."""
 
 import argparse
+import gc
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -126,6 +127,7 @@ def _map_all(
     total = None if scans is None else options.scans.count(scans)
     name = Path(options.log).name
     taken = 0
+    gc.freeze()  # what is loaded by now stays: collecting it again and again holds scans up
     for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
         mapper.add(scan)
         taken += 1

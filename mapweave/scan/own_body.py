@@ -59,6 +59,7 @@ class OwnBodyParameters(StageParameters):
         lambda c: 5 * c.sensor.range_sigma, gt=0, description="[m] that it may reach farther"
     )
 
+
 COUNTED = 64  # scans whose readings are counted together, at the most: it takes less time
 
 

@@ -61,7 +61,9 @@ def pose_uncertainty(
     xx, xy, yy, turn = _covariance(information, p)
     spread = np.array([[xx + p.floor**2, xy], [xy, yy + p.floor**2]])
     across, along, least = ellipse(spread)
-    return np.array([math.sqrt(along), math.sqrt(across), math.hypot(turn**0.5, p.turn_floor), least])
+    return np.array(
+        [math.sqrt(along), math.sqrt(across), math.hypot(turn**0.5, p.turn_floor), least]
+    )
 
 
 def _covariance(
@@ -82,7 +84,9 @@ def turn_uncertainty(uncertainty: FloatArray, angle: float) -> FloatArray:
     """Return (..., 4) `uncertainty` in a frame in which its own is turned by `angle` [rad]."""
     if uncertainty.ndim == 1:
         along, across, turn, direction = uncertainty.tolist()
-        return np.array([along, across, turn, math.remainder(2 * (direction + angle), 2 * math.pi) / 2])
+        return np.array(
+            [along, across, turn, math.remainder(2 * (direction + angle), 2 * math.pi) / 2]
+        )
     turned = np.array(uncertainty, dtype=float)
     turned[..., 3] = _undirected(turned[..., 3] + angle)
     return turned
