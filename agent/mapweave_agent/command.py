@@ -1,7 +1,6 @@
 """``mapweave agent``: the process of one robot."""
 
 import argparse
-import gc
 import logging
 import math
 import sys
@@ -18,6 +17,7 @@ from mapweave.cli import (
 )
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.fusion.align import FusionParameters, align
+from mapweave.garbage import spared
 from mapweave.ids import check_id
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.scan_range import ScanRange
@@ -129,14 +129,14 @@ def _run(options: argparse.Namespace) -> int:
         run = AgentRun(
             session, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
         )
-        _run_on(source, run, options)
+        with spared():
+            _run_on(source, run, options)
     return 0
 
 
 def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> None:
     """Run on the scans chosen: a recording is played at a rate, others come when they come."""
     stopping = stop_on_signal()
-    gc.freeze()  # what is loaded by now stays: collecting it again and again holds scans up
     if source.live:
         skipping = not math.isinf(options.rate)
         with scans_of(source, options.scans, skipping=skipping) as scans:

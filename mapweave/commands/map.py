@@ -1,7 +1,6 @@
 """``mapweave map``: a laser log to a robot's map."""
 
 import argparse
-import gc
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from mapweave.commands.progress import track
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import FileError
+from mapweave.garbage import spared
 from mapweave.ids import check_id
 from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save
@@ -127,10 +127,10 @@ def _map_all(
     total = None if scans is None else options.scans.count(scans)
     name = Path(options.log).name
     taken = 0
-    gc.freeze()  # what is loaded by now stays: collecting it again and again holds scans up
-    for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
-        mapper.add(scan)
-        taken += 1
+    with spared():
+        for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
+            mapper.add(scan)
+            taken += 1
     return mapper.finish(), taken
 
 
