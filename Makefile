@@ -90,6 +90,13 @@ bench-speed: $(KERNELS)
 bench-fusion: $(KERNELS)
 	$(BIN)/python -m benchmarks fusion
 
+# Half an hour: outages, kills, lossy links; SEEDS=5 for fewer outages, EVENTS=10 for fewer kills.
+.PHONY: bench-faults
+bench-faults: $(KERNELS)
+	$(BIN)/python -m benchmarks outages --seeds $(or $(SEEDS),50)
+	$(BIN)/python -m benchmarks kills --events $(or $(EVENTS),50)
+	$(BIN)/python -m benchmarks lossy
+
 # What was made of the sources; results (demo, team, bench) stay.
 clean:
 	rm -rf .venv .venv-wheel .matrix dist site

@@ -23,6 +23,7 @@ from benchmarks import (
     team,
     wire,
 )
+from benchmarks.faults import kills, lossy, outages
 from benchmarks.speed import command as speed
 
 
@@ -53,6 +54,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     "team": team,
     "confidence": fit_confidence,
     "wire": wire,
+    "outages": outages,
+    "kills": kills,
+    "lossy": lossy,
     "page": page,
     "mutations": mutations,
 }

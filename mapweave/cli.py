@@ -43,11 +43,14 @@ class Command:
         Adds the subcommand's arguments to its parser.
     run
         Does the work and returns the exit status.
+    example
+        A line of words after ``mapweave COMMAND`` that do something useful, for its ``--help``.
     """
 
     summary: str
     configure: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace], int]
+    example: str = ""
 
 
 def argument(parse: Callable[[str], T]) -> Callable[[str], T]:
@@ -102,6 +105,11 @@ def add_topic_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json``: what is said is for a program."""
+    parser.add_argument("--json", action="store_true", help="say it as JSON, for a program")
+
+
 def config_of(options: argparse.Namespace) -> "Config":
     """Return the configuration that ``--config`` and the environment make of the defaults.
 
@@ -148,6 +156,18 @@ def summary_of(point: EntryPoint) -> str:
     return command.summary
 
 
+def parser_of(name: str, command: Command) -> argparse.ArgumentParser:
+    """Return the parser of a subcommand: its help ends with an example."""
+    prog = f"mapweave {name}"
+    parser = argparse.ArgumentParser(
+        prog=prog,
+        description=command.summary,
+        epilog=f"example: {prog} {command.example}".rstrip(),
+    )
+    command.configure(parser)
+    return parser
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program and return its exit status: 0 done, 1 failed, 2 wrong usage."""
     return _report(list(sys.argv[1:] if arguments is None else arguments))
@@ -166,8 +186,7 @@ def _run(words: list[str]) -> int:
         print(f"mapweave: no command {words[0]!r}; there are {known}", file=sys.stderr)  # noqa: T201
         return EXIT_USAGE
     command: Command = points[words[0]].load()
-    parser = argparse.ArgumentParser(prog=f"mapweave {words[0]}", description=command.summary)
-    command.configure(parser)
+    parser = parser_of(words[0], command)
     options = parser.parse_args(words[1:])
     if told := missing():
         print(f"mapweave: {told}", file=sys.stderr)  # noqa: T201

@@ -74,6 +74,24 @@ class UnknownSourceError(MapweaveError):
         self.scheme = scheme
 
 
+class UnusableOdometryError(MapweaveError):
+    """Odometry of a ROS 2 network, for scans that are not of one.
+
+    Parameters
+    ----------
+    source, odometry
+        What was asked for.
+    """
+
+    def __init__(self, source: str, odometry: str) -> None:
+        super().__init__(
+            f"odometry {odometry!r}: goes with scans of the same network, and these are of"
+            f" {source!r}; expected --source ros2:..., or --odometry prior"
+        )
+        self.source = source
+        self.odometry = odometry
+
+
 class ArgumentError(MapweaveError, ValueError):
     """An argument that cannot be used.
 

@@ -5,6 +5,8 @@ import re
 from mapweave.errors import InvalidIdError
 
 ID_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,31}$"
+# Of a component without its number: its robot, and its run where the robot does not tell.
+RUN_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,31}(@[a-z0-9][a-z0-9_-]{0,31})?$"
 _ID = re.compile(ID_PATTERN + r"(?!\n)")
 
 

@@ -250,7 +250,7 @@ def test_the_keys_on_the_wire_are_those_of_the_code() -> None:
 
 def test_the_messages_on_the_wire_are_those_of_the_code() -> None:
     kinds = [value for value in vars(messages).values() if isinstance(value, type)]
-    letters = {k.kind.decode() for k in kinds if issubclass(k, Message) and k is not Message}
+    letters = {k.letter.decode() for k in kinds if issubclass(k, Message) and k is not Message}
     assert letters
     assert set(re.findall(r"^\| [^|`]+ \| `([a-z])` \|", WIRE.text, re.MULTILINE)) == letters
 

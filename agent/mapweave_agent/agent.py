@@ -4,7 +4,6 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import zenoh
@@ -13,13 +12,14 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import Alignment, RobotMap
 from mapweave.scan.scan import Scan
-from mapweave.team.hysteresis import keep_joined
 from mapweave_agent.by_hand.kept_orders import KeptOrders
 from mapweave_agent.by_hand.own_marks import Frame, OwnMarks
+from mapweave_agent.comparing.outcomes import found_in, message_of
 from mapweave_agent.comparison_schedule import ComparisonSchedule
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.listening import listening
+from mapweave_agent.live.attending import attending
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -28,9 +28,9 @@ from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
-from mapweave_protocol.link.asking import request_orders_of_coordinator
+from mapweave_protocol.link.asking import request_map, request_orders_of_coordinator
 from mapweave_protocol.link.inbox import Inbox
-from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion, PoseMessage, StatusMessage
+from mapweave_protocol.wire.messages import MapVersion, PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
 LIVE_POLL = 0.05  # [s] after which it is noticed that no scans come, or nothing arrives
@@ -90,12 +90,14 @@ class AgentRun:
         self._first = first
         self._tell = tell
         self._publication = PublicationSchedule(parameters.map_interval)
+        self._keeping = PublicationSchedule(parameters.state_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
-        if past:
-            self._comparisons.earlier_map(past[-1].map)
+        for run in past:
+            self._comparisons.earlier_map(run.map)
         self._needs = Needs(mapper.robot)
         self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
-        self._marks = OwnMarks(mapper.robot, mapper.boot)
+        self._published: RobotMap = mapper.robot_map()
+        self._marks = OwnMarks(mapper.robot, mapper.boot, self._published.marks)
         self._orders = KeptOrders(state)
         self._reception = Dispatcher(
             mapper.robot,
@@ -109,9 +111,9 @@ class AgentRun:
         self._inbox = Inbox()
         self._mapping = threading.Lock()
         self._live: LiveScans | None = None
-        self._published: RobotMap = mapper.robot_map()
         self._scans_seen = 0
         self._changed = False
+        self._unkept = False
         self._finished = False
         self._status_due = 0.0
 
@@ -152,29 +154,12 @@ class AgentRun:
         """
         self._live = scans
         with self._in_the_team():
-            with self._attending() as failed:
+            with attending(lambda: self._attend(LIVE_POLL)) as failed:
                 while not (stopping() or scans.ended or failed()):
                     scan = scans.take(LIVE_POLL)
                     if scan is not None:
                         self._map(scan)
             self._compare_until(stopping)
-
-    @contextmanager
-    def _attending(self) -> Iterator[Callable[[], bool]]:
-        """Do all but mapping in a thread of its own; give a block what tells that it failed."""
-        over = threading.Event()
-
-        def attend() -> None:
-            while not over.is_set():
-                self._attend(LIVE_POLL)
-
-        with ThreadPoolExecutor(1, thread_name_prefix="attending") as thread:
-            attended = thread.submit(attend)
-            try:
-                yield attended.done
-            finally:
-                over.set()
-            attended.result()
 
     @contextmanager
     def _in_the_team(self) -> Iterator[None]:
@@ -189,6 +174,15 @@ class AgentRun:
         if not stopping():
             self._finish()
         while not stopping():
+            self._attend(POLL)
+        self._leave()
+
+    def _leave(self) -> None:
+        """Publish what is not yet, and wait a moment for the coordinators that are here."""
+        if self._changed and not self._finished:
+            self._publish_map(complete=False)
+        deadline = time.monotonic() + self._parameters.leave_within
+        while not self._needs.delivered(self._state_published) and time.monotonic() < deadline:
             self._attend(POLL)
 
     def _map_all(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
@@ -211,6 +205,7 @@ class AgentRun:
             self._tell(pose)
         self._scans_seen += 1
         self._changed |= placement.placed
+        self._unkept |= placement.placed
         if placement.submap_finished or placement.lost:
             self._publication.hurry()
         if placement.lost:
@@ -243,17 +238,20 @@ class AgentRun:
             self._publish_marks()
         if self._changed and not self._finished and self._publication.due(now):
             self._publish_map(complete=False)
+        if self._unkept and not self._finished and self._keeping.due(now):
+            self._keep(self._draw())
         self._compare(now)
         self._supply(now)
         if now >= self._status_due:
             self._publish_status()
 
     def _supply(self, now: float) -> None:
-        """Send again what others lack, and answer who has asked."""
-        own = MapVersion.of(self._published) if self._published.submaps else None
+        """Send again what others lack, answer who has asked, and ask for what is lacking here."""
+        found = [m for run in self._past.values() for m in run.found]
+        found += [*self._comparisons.orphans, *self._outbox.found]
         marked = {run.marks_state: run.marks for run in self._past.values()}
         marks = [s for s in (self._marks.state, *marked) if s is not None]
-        missing = self._needs.missing(own, self._outbox.found, now, self._past, marks)
+        missing = self._needs.missing(self._state_published, found, now, self._past, marks)
         if missing.map:
             self._outbox.send_map(self._published, complete=True)
         for run in missing.past:
@@ -265,6 +263,8 @@ class AgentRun:
         if self._orders.lacks(now):
             request_orders_of_coordinator(self._session, self._team, self._inbox.put)
         self._outbox.answer(self._published, self._orders.message)
+        for state in self._comparisons.to_ask_for(now):
+            request_map(self._session, self._team, state, self._inbox.add)
 
     def _compare(self, now: float) -> None:
         """Publish the outcome of the comparison under way, if there is one; begin the next."""
@@ -280,35 +280,41 @@ class AgentRun:
 
     def _publish_outcome(self, outcome: ComparisonOutcome) -> Sequence[Alignment]:
         """Return what was published: nothing where comparing failed."""
-        comparison = outcome.comparison
-        if outcome.alignments is None:
-            # What was found out about earlier versions of the pair stands.
-            _log.error("comparing with %s failed: %s", comparison.peer, outcome.failure)
+        have_met = self._comparisons.have_met(outcome.comparison)
+        found = found_in(outcome, have_met=have_met)
+        if found is None:
             return ()
-        found = outcome.alignments
-        if self._comparisons.have_met(comparison):
-            found = keep_joined(found)
-        message = AlignmentMessage.pack(
-            self._mapper.robot,
-            MapVersion.of(comparison.reference),
-            MapVersion.of(comparison.other),
-            found,
-        )
+        message = message_of(self._mapper.robot, outcome.comparison, found)
         self._outbox.send_alignments(message)
+        self._whereabouts.met(message)
+        self._state.keep_found(self._mapper.boot, self._outbox.found)
         return found
 
     def _publish_map(self, *, complete: bool) -> None:
         self._changed = False
-        with self._mapping:
-            snapshot = self._mapper.snapshot()
-        mapped = without_strays(snapshot.robot_map())
-        self._published = numbered_from(mapped, self._first)
+        self._published = self._draw()
         arrives = self._outbox.send_map(self._published, complete=complete)
         self._tell(self._published)
-        self._state.keep(self._published)
+        self._keep(self._published)
         # Peers compare what has arrived: so do we, that it is decided alike on both ends.
         self._comparisons.own_map(arrives, finished=self._finished)
         self._publication.published(time.monotonic())
+
+    def _draw(self) -> RobotMap:
+        """Return the map as it is now; what changes while it is drawn is still to be kept."""
+        self._unkept = False
+        with self._mapping:
+            snapshot = self._mapper.snapshot()
+        return numbered_from(without_strays(snapshot.robot_map()), self._first)
+
+    def _keep(self, robot_map: RobotMap) -> None:
+        self._state.keep(robot_map)
+        self._keeping.published(time.monotonic())
+
+    @property
+    def _state_published(self) -> MapVersion | None:
+        """Which state of the map was published last, None while there is nothing in it."""
+        return MapVersion.of(self._published) if self._published.submaps else None
 
     def _publish_marks(self) -> None:
         message = self._marks.message()

@@ -16,10 +16,12 @@ from mapweave.cli import (
     positive,
 )
 from mapweave.commands.starting import Start, add_start_arguments
+from mapweave.config import Config
+from mapweave.errors import UnusableOdometryError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.garbage import spared
 from mapweave.ids import check_id
-from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import ScanSource, open_source
 from mapweave_agent.agent import AgentRun
@@ -66,6 +68,14 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         metavar="A:B",
         help="which scans, counted from 0, B not included",
     )
+    parser.add_argument(
+        "--odometry",
+        type=argument(OdometryChoice.parse),
+        default="none",
+        metavar="WHICH",
+        help="let odometry help; what was seen decides: none, prior for that of the log, a bag's"
+        " topic such as /odom, or ros2:/odom or ros2:/tf where the scans are (default %(default)s)",
+    )
     add_start_arguments(parser)
     parser.add_argument(
         "--map-interval",
@@ -105,8 +115,7 @@ def _run(options: argparse.Namespace) -> int:
     team, endpoints = connection_of(options)
     config = config_of(options)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
-    step, warn = config.sensor.angular_step, told_once(_log.warning)
-    source = open_source(options.source, ReadOptions(False, step, options.topic, warn, endpoints))
+    source = open_source(options.source, _read_options(options, config, endpoints))
     start = Start.of(options)
     total = count_selected(options.source, source, options.scans)
     output = output_of(options.publish, robot, endpoints, source)
@@ -134,6 +143,22 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _read_options(
+    options: argparse.Namespace, config: Config, endpoints: tuple[str, ...]
+) -> ReadOptions:
+    odometry: OdometryChoice = options.odometry
+    if odometry.live and not options.source.startswith("ros2:"):
+        raise UnusableOdometryError(options.source, f"ros2:{odometry.topic}")
+    return ReadOptions(
+        odometry.prior,
+        config.sensor.angular_step,
+        options.topic,
+        told_once(_log.warning),
+        endpoints,
+        odometry.topic,
+    )
+
+
 def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> None:
     """Run on the scans chosen: a recording is played at a rate, others come when they come."""
     stopping = stop_on_signal()
@@ -145,4 +170,9 @@ def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> N
         run.run(options.scans.of(source.scans()), ReplayClock(options.rate), stopping)
 
 
-command = Command("Map the scans of one robot, and compare with its team.", _configure, _run)
+command = Command(
+    "Map the scans of one robot, and compare with its team.",
+    _configure,
+    _run,
+    "--robot r1 --team rescue --source ros2:/scan",
+)

@@ -1,18 +1,30 @@
 """Which pair of maps to compare next; no clock and no network in here."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
+from typing import TypeAlias
 
 from mapweave.maps import Alignment, RobotMap
 from mapweave.team.hysteresis import joins
+from mapweave_agent.comparing.team_maps import JoinedRuns, TeamMaps
 from mapweave_agent.publication_schedule import AgentParameters
-from mapweave_protocol.wire.messages import AlignmentMessage, Compared, MapVersion
-from mapweave_protocol.wire.pairs import is_earlier_run, ordered, responsible
+from mapweave_protocol.link.lacking import Lacking
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    Compared,
+    JointStatusMessage,
+    MapVersion,
+)
+from mapweave_protocol.wire.pairs import Run, is_older, ordered, responsible, run_of, states_of
+
+PairOfRuns: TypeAlias = frozenset[Run]
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two robots' maps to compare; `reference` is the robot of the smaller id."""
+    """Two runs' maps to compare; `reference` is of the robot of the smaller id."""
 
     peer: str
     reference: RobotMap
@@ -20,53 +32,35 @@ class Comparison:
 
 
 @dataclass
-class _Peer:
-    """What is known of another robot.
+class _Pair:
+    """What is known of two runs.
 
     Attributes
     ----------
-    newest
-        Its newest map.
-    boots
-        The runs of it that are alive.
-    gone
-        Whether there were some, and are no longer; its map may be here before its token.
-    last
-        Boot and version of the map it said to be its last.
-    compared, published
-        The versions compared last: by whomever, and by us.
+    compared
+        Of which states of their maps an alignment was published last, by whomever.
+    published
+        The same, by us.
     met
-        The runs of it whose map was joined with ours, by whomever.
+        Whether their maps were joined once, by whomever.
+    learned
+        What another one found out last.
     rests_until
-        While it still maps, the pair is not compared before.
+        While they still map, the pair is not compared before.
     """
 
-    newest: RobotMap | None = None
-    boots: set[str] = field(default_factory=set)
-    gone: bool = False
-    last: tuple[str, int] | None = None
-    compared: Compared | None = None
+    compared: tuple[MapVersion, MapVersion] | None = None
     published: Compared | None = None
-    met: set[str] = field(default_factory=set)
-    rests_until: float = 0.0
-
-    def outdated(self, own: RobotMap | None) -> bool:
-        """Tell whether the newest maps have not been compared."""
-        if own is None or self.newest is None:
-            return False
-        return self.compared != _versions(own, self.newest)
-
-    def done_mapping(self) -> bool:
-        """Tell whether its newest map is its last."""
-        return self.newest is not None and self.last == (self.newest.boot, self.newest.version)
-
-
-def _versions(own: RobotMap | MapVersion, peer: RobotMap | MapVersion) -> Compared:
-    return Compared(own_version=own.version, peer_boot=peer.boot, peer_version=peer.version)
+    met: bool = False
+    learned: AlignmentMessage | None = None
+    rests_until: float = field(default=0.0)
 
 
 class ComparisonSchedule:
     """Which pair to compare next: always of the newest maps, and in the end of the last ones.
+
+    Maps of runs that are over never change: each is compared with what may show its place until
+    the joint map has it there.
 
     Parameters
     ----------
@@ -79,113 +73,197 @@ class ComparisonSchedule:
         self._parameters = parameters
         self._own: RobotMap | None = None
         self._own_finished = False
-        self._peers: dict[str, _Peer] = {}
+        self._earlier: dict[str, RobotMap] = {}  # this robot's runs before, by boot
+        self._team = TeamMaps()
+        self._joined = JoinedRuns()
+        self._wanted: list[MapVersion] = []
+        self._lacking = Lacking()
+        self._pairs: dict[PairOfRuns, _Pair] = {}
+        self._quiet_until = -math.inf
 
     def own_map(self, robot_map: RobotMap, *, finished: bool) -> None:
         """Take in this robot's map as published; `finished` says that it is the last."""
         self._own = robot_map
         self._own_finished = finished
-
-    def peer_map(self, robot_map: RobotMap) -> None:
-        """Take in a peer's map, unless one of a later run is known."""
-        peer = self._peer(robot_map.robot)
-        if peer.newest is None or not is_earlier_run(robot_map, peer.newest):
-            peer.newest = robot_map
+        self._wake()
 
     def earlier_map(self, robot_map: RobotMap) -> None:
-        """Take in the map of this robot's run before this one: it is compared as a peer's."""
-        earlier = self._peer(robot_map.robot)
-        earlier.newest, earlier.last = robot_map, (robot_map.boot, robot_map.version)
+        """Take in the map of a run of this robot before this one: it is compared as a peer's."""
+        self._earlier[robot_map.boot] = robot_map
+        self._wake()
+
+    def peer_map(self, robot_map: RobotMap) -> None:
+        """Take in the map of a run of a peer, or of another process with this robot's id."""
+        if robot_map.robot != self._robot or robot_map.boot not in self._own_boots:
+            self._team.take(robot_map)
+            self._wake()
 
     def peer_finished(self, robot: str, boot: str, version: int) -> None:
-        """Note that the map of that version is a peer's last."""
-        self._peer(robot).last = boot, version
+        """Note that the map of that version is the last of a run."""
+        self._team.note_last(robot, boot, version)
+        self._wake()
 
     def peer_here(self, robot: str, boot: str) -> None:
         """Note that a run of a peer is alive."""
-        peer = self._peer(robot)
-        peer.boots.add(boot)
-        peer.gone = False
+        self._team.here(robot, boot)
+        self._wake()
 
     def peer_gone(self, robot: str, boot: str) -> None:
         """Note that a run of a peer is no longer alive: its duties fall to us."""
-        peer = self._peer(robot)
-        peer.boots.discard(boot)
-        peer.gone = not peer.boots
+        self._team.left(robot, boot)
+        self._wake()
+
+    def coordinator(self, status: JointStatusMessage) -> None:
+        """Take in which pairs' alignments a coordinator holds, and which runs it has joined."""
+        self._joined.take(status)
+        others = [state for state in status.maps if run_of(state) not in self._own_runs]
+        for state in others:
+            self._team.note_map_of(state.robot)
+        self._wanted = [state for state in others if self._team.is_gone(state.robot)]
+        for ends in status.alignments:
+            self._note_compared(ends)
+        self._wake()
+
+    def to_ask_for(self, now: float) -> list[MapVersion]:
+        """Return which maps to ask a coordinator for at `now` [s]: their robots are gone."""
+        return [
+            state
+            for state in self._wanted
+            if self._lacking.due(str(run_of(state)), state, now, lacks=not self._team.holds(state))
+        ]
 
     def learned(self, message: AlignmentMessage) -> None:
-        """Take in what a peer found out about our pair: we need not do it again."""
-        versions = {version.robot: version for version in (message.reference, message.other)}
-        own, peer = versions.get(self._robot), versions.get(message.robot)
-        if self._own is None or own is None or peer is None or own.boot != self._own.boot:
-            return
-        self._peer(message.robot).compared = _versions(own, peer)
-        self._note_meeting(message.robot, peer.boot, message.unpack())
+        """Take in what another found out about a pair: we need not do it again."""
+        self._note_compared((message.reference, message.other))
+        pair = self._pair(message.reference, message.other)
+        pair.met |= joins(message.unpack())
+        pair.learned = message
+        self._wake()
 
     def begin(self, now: float) -> Comparison | None:
-        """Return the next comparison, None if none is due; of several, the one due longest."""
-        own = self._own
-        due = [(p.rests_until, name) for name, p in self._peers.items() if self._due(name, now)]
-        newest = self._peers[min(due)[1]].newest if due else None
-        if own is None or newest is None:
+        """Return the next comparison, None if none is due; of several, the one due longest.
+
+        Those of runs that are over come last: what they are like does not change.
+        """
+        if self._own is None or now < self._quiet_until:
             return None
-        first, _ = ordered(own.robot, newest.robot)
-        pair = (own, newest) if own.robot == first else (newest, own)
-        return Comparison(newest.robot, *pair)
+        ours = [(self._is_over(*pair), self._pair(*pair).rests_until, pair) for pair in self._ours]
+        due = [(over, since, pair) for over, since, pair in ours if self._due(pair, since, now)]
+        if not due:
+            self._quiet_until = min((since for _, since, _ in ours), default=math.inf)
+            return None
+        own, other = min(due, key=lambda each: each[:2])[2]
+        first, _ = ordered(own.robot, other.robot)
+        return Comparison(other.robot, *((own, other) if own.robot == first else (other, own)))
 
     def have_met(self, comparison: Comparison) -> bool:
         """Tell whether the two runs that `comparison` is of were joined once."""
-        _, other = self._sides(comparison)
-        return other.boot in self._peer(comparison.peer).met
+        return self._pair(comparison.reference, comparison.other).met
 
     def done(
         self, comparison: Comparison, now: float, took: float, found: Sequence[Alignment] = ()
     ) -> None:
         """Note that `comparison` has taken `took` [s], and what was `found` and published."""
-        own, other = self._sides(comparison)
-        peer = self._peer(comparison.peer)
-        self._note_meeting(comparison.peer, other.boot, found)
-        peer.compared = peer.published = _versions(own, other)
+        ends = comparison.reference, comparison.other
+        own, other = ends if run_of(ends[0]) in self._own_runs else ends[::-1]
+        pair = self._pair(own, other)
+        pair.compared = MapVersion.of(own), MapVersion.of(other)
+        pair.published = Compared(
+            own_version=own.version, peer_boot=other.boot, peer_version=other.version
+        )
+        pair.met |= joins(found)
+        pair.learned = None
         rest = max(self._parameters.comparison_interval, took * self._parameters.comparison_rest)
-        peer.rests_until = now + rest
+        pair.rests_until = now + rest
+        self._wake()
+
+    @property
+    def orphans(self) -> list[AlignmentMessage]:
+        """What robots that are gone have found, in this robot's name: it may be all there is."""
+        learned = (pair.learned for pair in self._pairs.values())
+        return [
+            message.model_copy(update={"robot": self._robot})
+            for message in learned
+            if message is not None and self._team.is_gone(message.robot)
+        ]
 
     @property
     def published(self) -> Mapping[str, Compared]:
-        """By peer, the versions we compared last."""
-        peers = self._peers.items()
-        return {name: peer.published for name, peer in peers if peer.published is not None}
+        """By peer, the versions we compared last of this run and the peer's newest."""
+        if self._own is None:
+            return {}
+        pairs = {m.robot: self._pairs.get(_key(self._own, m)) for m in self._team.newest}
+        return {name: p.published for name, p in pairs.items() if p and p.published}
 
     @property
     def held(self) -> tuple[MapVersion, ...]:
-        """Which state of each peer's map is here."""
-        names = sorted(self._peers.keys() - {self._robot})
-        newest = (self._peers[name].newest for name in names)
-        return tuple(MapVersion.of(robot_map) for robot_map in newest if robot_map is not None)
+        """Which state of the map of each run that is alive, or was the last to be, is here."""
+        return tuple(MapVersion.of(robot_map) for robot_map in self._team.current)
 
     @property
     def idle(self) -> bool:
         """Whether nothing is left for us to compare, unless something new arrives."""
-        return not any(self._ours(name) for name in self._peers)
+        return self._own is None or next(self._ours, None) is None
 
-    def _due(self, name: str, now: float) -> bool:
-        peer = self._peers[name]
-        both_finished = self._own_finished and peer.done_mapping()
-        return self._ours(name) and (both_finished or now >= peer.rests_until)
+    @property
+    def _own_boots(self) -> set[str]:
+        return {boot for _, boot in self._own_runs}
 
-    def _ours(self, name: str) -> bool:
-        """Tell whether there is something to compare with a peer, and it is for us to do it."""
-        peer = self._peers[name]
-        duty = responsible(self._robot, name) == self._robot or peer.gone
-        return duty and peer.outdated(self._own)
+    @property
+    def _own_runs(self) -> set[Run]:
+        runs = {run_of(robot_map) for robot_map in self._earlier.values()}
+        return runs if self._own is None else runs | {run_of(self._own)}
 
-    def _note_meeting(self, peer: str, boot: str, found: Sequence[Alignment]) -> None:
-        if joins(found):
-            self._peer(peer).met.add(boot)
+    @property
+    def _ours(self) -> Iterator[tuple[RobotMap, RobotMap]]:
+        """Yield the pairs that are to be compared by us, a map of ours first."""
+        assert self._own is not None  # asked before
+        own = [self._own, *self._earlier.values()]
+        pairs = [*combinations(own, 2), *((a, b) for a in own for b in self._team.all)]
+        for ours, other in pairs:
+            if self._outdated(ours, other) and self._duty(ours, other):
+                yield ours, other
 
-    def _sides(self, comparison: Comparison) -> tuple[RobotMap, RobotMap]:
-        """Return our map and the peer's."""
-        pair = comparison.reference, comparison.other
-        return pair if pair[0].robot == self._robot else pair[::-1]
+    def _outdated(self, own: RobotMap, other: RobotMap) -> bool:
+        """Tell whether the newest maps have not been compared."""
+        pair = self._pairs.get(_key(own, other))
+        now = {run_of(own): own.version, run_of(other): other.version}
+        return pair is None or pair.compared is None or states_of(pair.compared) != now
 
-    def _peer(self, name: str) -> _Peer:
-        return self._peers.setdefault(name, _Peer())
+    def _duty(self, own: RobotMap, other: RobotMap) -> bool:
+        """Tell whether it is for us to compare two maps."""
+        if self._is_over(own, other) and self._joined.tells(own, other):
+            return False
+        if own is not self._own or other.boot in self._earlier:
+            return True  # runs of ours that are over are nobody else's business
+        gone = self._team.is_gone(other.robot)
+        if other.robot == self._robot:
+            return gone or own.boot < other.boot
+        # Whoever is here compares the runs that it has behind it.
+        over = self._team.is_over(other)
+        return gone or (not over and responsible(self._robot, other.robot) == self._robot)
+
+    def _is_over(self, own: RobotMap, other: RobotMap) -> bool:
+        """Tell whether one of the two is of a run that another one has followed."""
+        return own is not self._own or other.boot in self._earlier or self._team.is_over(other)
+
+    def _due(self, pair: tuple[RobotMap, RobotMap], rests_until: float, now: float) -> bool:
+        own, other = pair
+        ours_last = self._own_finished or own is not self._own
+        both_last = ours_last and (other.boot in self._earlier or self._team.is_last(other))
+        return both_last or now >= rests_until
+
+    def _note_compared(self, ends: tuple[MapVersion, MapVersion]) -> None:
+        pair = self._pair(*ends)
+        if pair.compared is None or not is_older(ends, pair.compared):
+            pair.compared = ends
+
+    def _pair(self, one: RobotMap | MapVersion, another: RobotMap | MapVersion) -> _Pair:
+        return self._pairs.setdefault(_key(one, another), _Pair())
+
+    def _wake(self) -> None:
+        self._quiet_until = -math.inf
+
+
+def _key(one: RobotMap | MapVersion, another: RobotMap | MapVersion) -> PairOfRuns:
+    return frozenset({run_of(one), run_of(another)})

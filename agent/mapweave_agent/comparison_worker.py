@@ -14,6 +14,7 @@ from typing import TypeAlias
 from mapweave.maps import Alignment, RobotMap
 from mapweave_agent.comparison_schedule import Comparison
 from mapweave_agent.worker import Worker, answer
+from mapweave_protocol.wire.pairs import told_apart
 
 Aligner: TypeAlias = Callable[[RobotMap, RobotMap], Sequence[Alignment]]
 
@@ -65,7 +66,7 @@ class ComparisonWorker(Worker):
         self._comparison = comparison
         self._started = time.monotonic()
         try:
-            self._pipe.send((comparison.reference, comparison.other))
+            self._pipe.send(told_apart(comparison.reference, comparison.other))
         except (BrokenPipeError, ConnectionResetError):
             # The process died while it waited; `take` starts another and reports it.
             return

@@ -49,6 +49,7 @@ class Dispatcher:
         orders: KeptOrders,
     ) -> None:
         self._robot = robot
+        self._boot = boot
         self._plan = plan
         self._needs = needs
         self._whereabouts = whereabouts
@@ -91,7 +92,9 @@ class Dispatcher:
             count = self._namesakes.take(presence.boot, here=presence.here)
             if count:
                 _log.warning(tell_robots(self._robot, count))
-        elif presence.here:
+        if (presence.robot, presence.boot) == (self._robot, self._boot):
+            return
+        if presence.here:
             self._plan.peer_here(presence.robot, presence.boot)
         else:
             self._plan.peer_gone(presence.robot, presence.boot)
@@ -100,24 +103,28 @@ class Dispatcher:
         count = self._coordinators.take(boot, here=here)
         if count:
             _log.warning(tell_coordinators(count))
+        self._whereabouts.coordinator_here(boot, here=here)
+        if not here:
+            self._needs.coordinator_gone(boot)
 
     def _take_joint_status(self, arrival: Arrival) -> None:
         status = self._joint_statuses.read(arrival)
         if status is not None:
             self._needs.coordinator(status)
+            self._plan.coordinator(status)
             self._whereabouts.coordinator(status)
             self._orders.coordinator(status)
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)
-        if message is not None and message.robot != self._robot:
+        if message is not None:
             robot_map = self._assembler.update(message)
             if robot_map is not None:
                 self._plan.peer_map(robot_map)
 
     def _take_status(self, arrival: Arrival) -> None:
         status = self._statuses.read(arrival)
-        if status is None or status.robot == self._robot:
+        if status is None or (status.robot, status.boot) == (self._robot, self._boot):
             return
         self._needs.peer(status)
         if status.state == "finished":
@@ -127,3 +134,4 @@ class Dispatcher:
         message = self._alignments.read(arrival)
         if message is not None and message.robot != self._robot:
             self._plan.learned(message)
+            self._whereabouts.met(message)

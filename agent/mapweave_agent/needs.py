@@ -40,10 +40,19 @@ class Needs:
         self._lacking = Lacking()
         self._coordinators: dict[str, JointStatusMessage] = {}
         self._peers: dict[str, StatusMessage] = {}
+        self._here: dict[str, JointStatusMessage] = {}  # the last of each that is alive
 
     def coordinator(self, status: JointStatusMessage) -> None:
         """Take in what a coordinator holds."""
-        self._coordinators[status.boot] = status
+        self._coordinators[status.boot] = self._here[status.boot] = status
+
+    def coordinator_gone(self, boot: str) -> None:
+        """Note that a coordinator is no longer alive."""
+        self._here.pop(boot, None)
+
+    def delivered(self, own: MapVersion | None) -> bool:
+        """Tell whether every coordinator that is here has said that it holds this robot's map."""
+        return own is None or all(own in status.maps for status in self._here.values())
 
     def peer(self, status: StatusMessage) -> None:
         """Take in what another robot holds."""

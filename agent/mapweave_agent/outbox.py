@@ -29,6 +29,7 @@ from mapweave_protocol.wire.messages import (
     StatusMessage,
     Traffic,
 )
+from mapweave_protocol.wire.pairs import Run, states_of
 from mapweave_protocol.wire.queries import JointQuery
 
 WAITING_QUERIES = 16
@@ -54,7 +55,7 @@ class Outbox:
         self._boot = boot
         self._sender = MapSender()
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
-        self._found: dict[tuple[str, str], AlignmentMessage] = {}
+        self._found: dict[frozenset[Run], AlignmentMessage] = {}
         self._marked: dict[str, MarksMessage] = {}
         self._messages = Counter(dict.fromkeys(KINDS, 0))
         self._bytes = Counter(dict.fromkeys(KINDS, 0))
@@ -100,7 +101,7 @@ class Outbox:
 
     @property
     def found(self) -> Iterable[AlignmentMessage]:
-        """What was published last of each pair of robots."""
+        """What was published last of each pair of runs."""
         return self._found.values()
 
     def send_map(self, robot_map: RobotMap, *, complete: bool) -> RobotMap:
@@ -124,7 +125,7 @@ class Outbox:
         if publisher is None:
             publisher = declare_alignment_publisher(self._session, self._key_of(message))
             self._alignments[pair] = self._declared.enter_context(publisher)
-        self._found[pair] = message
+        self._found[frozenset(states_of((message.reference, message.other)))] = message
         self._put("alignment", publisher, encode(message))
 
     def send_status(self, message: StatusMessage) -> None:

@@ -132,6 +132,7 @@ class Agent:
         *,
         range_min: float = 0.0,
         range_max: float = math.inf,
+        time_increment: float = 0.0,
     ) -> None:
         """Hand over a scan; returns at once. Parameters as of `mapweave.Scan.of`.
 
@@ -151,6 +152,7 @@ class Agent:
             range_max=range_max,
             index=self._fed,
             stamp=stamp,
+            time_increment=time_increment,
         )
         self._fed += 1
         self._scans.put(scan)

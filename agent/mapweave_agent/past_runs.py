@@ -1,7 +1,8 @@
-"""A robot's runs on disk, one file each: what a restarted agent numbers on from, and delivers.
+"""A robot's runs on disk: what a restarted agent numbers on from, and delivers.
 
-A file holds the whole map of a run, as the message that travels. Beside it lie the marks that the
-run made, and the orders of operators that were heard of.
+Of each run a file holds the whole map, as the message that travels, and another one what was found
+of it and other runs: a list of such messages. Beside it lie the marks that the run made, and the
+orders of operators that were heard of.
 """
 
 import logging
@@ -11,6 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+import msgpack
+
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError
 from mapweave.maps import RobotMap
@@ -18,6 +21,7 @@ from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler, MapSender
 from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
     MapMessage,
     MapVersion,
     MarksMessage,
@@ -27,6 +31,7 @@ from mapweave_protocol.wire.messages import (
 from mapweave_protocol.wire.model import Message
 
 SUFFIX = ".map"
+FOUND_SUFFIX = ".found"
 MARKS_SUFFIX = ".marks"
 ORDERS_FILE = "orders"
 
@@ -47,6 +52,8 @@ class PastRun:
         The same, as its message.
     age
         How long ago it was written [s].
+    found
+        What it found of pairs of runs.
     marks
         The message of the marks that it made; None where it made none.
     """
@@ -54,6 +61,7 @@ class PastRun:
     map: RobotMap
     payload: bytes
     age: float
+    found: tuple[AlignmentMessage, ...] = ()
     marks: MarksMessage | None = None
 
     @property
@@ -127,6 +135,17 @@ class StateFolder:
         with replace_file(self.path / name) as new:
             new.write_bytes(payload)
 
+    def keep_found(self, boot: str, found: Iterable[AlignmentMessage]) -> None:
+        """Keep what a run has found in place of what it had found before.
+
+        Raises
+        ------
+        FileError
+            If it cannot be written.
+        """
+        with replace_file(self.path / f"{boot}{FOUND_SUFFIX}") as new:
+            new.write_bytes(msgpack.packb([encode(message) for message in found]))
+
     def _message(self, path: Path, kind: type[M]) -> M | None:
         """Return what is in a file, None if it is not there; what is no message is told."""
         if not path.exists():
@@ -155,8 +174,20 @@ class StateFolder:
             _log.warning("%s: passed over, no whole map of %s", path, robot)
             return None
         marks = self._message(path.with_suffix(MARKS_SUFFIX), MarksMessage)
+        found = self._read_found(path.with_suffix(FOUND_SUFFIX))
         age = now - path.stat().st_mtime
-        return PastRun(robot_map, path.read_bytes(), age, marks)
+        return PastRun(robot_map, path.read_bytes(), age, found, marks)
+
+    def _read_found(self, path: Path) -> tuple[AlignmentMessage, ...]:
+        """Return what a run has found; nothing where it found nothing, or the file is damaged."""
+        if not path.exists():
+            return ()
+        try:
+            payloads = msgpack.unpackb(path.read_bytes())
+            return tuple(decode(AlignmentMessage, bytes(payload)) for payload in payloads)
+        except (MessageError, TypeError, ValueError) as error:
+            _log.warning("%s: passed over, %s", path, error)
+            return ()
 
 
 def default_folder(team: str, robot: str, environment: Mapping[str, str] = os.environ) -> Path:

@@ -11,6 +11,12 @@ class AgentParameters(BaseModel):
     map_interval: float = Field(
         2.0, gt=0, description="[s] at most this often the growing submap is published"
     )
+    state_interval: float = Field(
+        1.5, gt=0, description="[s] at least this often the growing map is kept on disk"
+    )
+    leave_within: float = Field(
+        3.0, ge=0, description="[s] that a coordinator is given to take the last map"
+    )
     comparison_interval: float = Field(
         5.0, ge=0, description="[s] at most this often a pair is compared while it still maps"
     )

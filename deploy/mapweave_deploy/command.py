@@ -205,4 +205,6 @@ def _say(console: Console, lines: Iterable[str]) -> None:
         console.print(Text(line), soft_wrap=True)
 
 
-command = Command("Run a whole team on this machine.", configure, run)
+command = Command(
+    "Run a whole team on this machine.", configure, run, "--world office --robots 3 --output team"
+)

@@ -121,4 +121,9 @@ def _page(
         yield feed
 
 
-command = Command("Coordinate a team: maps and alignments in, joint maps out.", _configure, _run)
+command = Command(
+    "Coordinate a team: maps and alignments in, joint maps out.",
+    _configure,
+    _run,
+    "--team rescue --store rescue.sqlite",
+)

@@ -5,7 +5,7 @@ Pure logic: no network, no clock (`now` is passed in), no threads. The caller ru
 
 import math
 from collections.abc import Iterator, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TypeAlias
 
@@ -24,7 +24,15 @@ from mapweave_protocol.wire.messages import (
     MarksMessage,
     OrderMessage,
 )
-from mapweave_protocol.wire.pairs import Run, is_older, states_of
+from mapweave_protocol.wire.pairs import (
+    Run,
+    clash,
+    is_older,
+    name_with_boot,
+    run_of,
+    states_of,
+    with_boots,
+)
 
 MAX_RUNS = 64  # of a robot: a new battery every hour for a week of days
 REMEMBERED_STATES = 64  # of a robot's map: an alignment comes a few versions after what it is of
@@ -115,6 +123,7 @@ class Coordinator:
         self._is_last_known = last is not None
         self._names: set[str] = set()
         self._maps: dict[Run, RobotMap] = {}
+        self._clashing: set[Run] = set()  # those that a robot's id does not tell apart
         self._states: dict[Run, dict[int, dict[int, SubmapPlace]]] = {}
         self._alignments: dict[frozenset[Run], AlignmentMessage] = {}
         self._carried: dict[frozenset[Run], _CarriedOver] = {}
@@ -145,9 +154,17 @@ class Coordinator:
 
     @property
     def maps(self) -> tuple[RobotMap, ...]:
-        """The maps of all runs of all robots but those to be forgotten, with their marks."""
-        maps = self._said.marked(self._said.without_forgotten(self._maps))
+        """The maps of all runs but those to be forgotten, with their marks.
+
+        Each is named as the joint map names it.
+        """
+        maps = self._said.marked(self._shown_maps)
         return tuple(sorted(maps.values(), key=lambda m: (m.robot, min(m.components))))
+
+    @property
+    def _shown_maps(self) -> dict[Run, RobotMap]:
+        maps = self._said.without_forgotten(self._maps)
+        return {run: with_boots(m) if run in self._clashing else m for run, m in maps.items()}
 
     @property
     def marks_held(self) -> tuple[MapVersion, ...]:
@@ -174,9 +191,8 @@ class Coordinator:
         return None if held is None else held.version
 
     def clashes(self, new: RobotMap) -> bool:
-        """Tell whether another run of the robot has components of the same names."""
-        others = [m for m in self._runs_of(new.robot) if m.boot != new.boot]
-        return any(not set(new.components).isdisjoint(m.components) for m in others)
+        """Tell whether the run of a map that is held is named by its boot as well."""
+        return run_of(new) in self._clashing
 
     def admits(self, robots: Set[str]) -> bool:
         """Return whether these robots are listened to; from the first time they are."""
@@ -189,17 +205,19 @@ class Coordinator:
         """Take a robot's map; return whether it is news.
 
         Each run of a robot has its map, and none replaces another's. It is no news when it is no
-        newer than the one known, or empty; nor when its components have the names of another
-        run's, or the robot has too many runs.
+        newer than the one known, or empty; nor when the robot has too many runs. Runs whose
+        components have the same numbers are named by their boots from then on.
         """
-        if not new.submaps or not self.admits({new.robot}) or self.clashes(new):
+        if not new.submaps or not self.admits({new.robot}):
             return False
-        known = self._maps.get(_run(new))
+        known = self._maps.get(run_of(new))
         if known is not None and known.version >= new.version:
             return False
         if known is None and len(self._runs_of(new.robot)) >= MAX_RUNS:
             return False
-        self._maps[_run(new)] = new
+        self._maps[run_of(new)] = new
+        same = [run_of(held) for held in self._runs_of(new.robot) if clash(held, new)]
+        self._clashing.update([*same, run_of(new)] if same else [])
         self._remember_state(new)
         self._raise_urgency(Urgency.SOON)
         return True
@@ -221,6 +239,10 @@ class Coordinator:
         joined_or_parted = _accepted_links(new) != _accepted_links(known)
         self._raise_urgency(Urgency.NOW if joined_or_parted else Urgency.SOON)
         return True
+
+    def holds(self, message: AlignmentMessage) -> bool:
+        """Tell whether this is what is known of its pair of runs."""
+        return self._alignments.get(frozenset(states_of(_ends(message)))) is message
 
     def receive_marks(self, new: MarksMessage) -> bool:
         """Take the marks that a run of a robot made; return whether they are news."""
@@ -253,7 +275,7 @@ class Coordinator:
         if self._draft is not None:
             raise RuntimeError("the last draft is not finished")
         alignments = tuple(self._alignments_in_force())
-        orders = self._said.orders(self._maps, self._said.without_forgotten(self._maps))
+        orders = self._said.orders(self._maps, self._shown_maps)
         self._draft = Draft(self._version + 1, self.maps, alignments, self._judged, orders)
         self._begun, self._urgency = now, Urgency.NONE
         return self._draft
@@ -267,7 +289,7 @@ class Coordinator:
 
     def _alignments_in_force(self) -> Iterator[Alignment]:
         """Yield the alignments between components that exist."""
-        shown = self._said.without_forgotten(self._maps)
+        shown = self._shown_maps
         existing = {
             component_name(robot_map.robot, component)
             for robot_map in shown.values()
@@ -282,34 +304,42 @@ class Coordinator:
     def _carried_over(self, message: AlignmentMessage) -> tuple[Alignment, ...]:
         """Return the alignments of `message` for the maps as they are; kept until these change."""
         runs = frozenset(states_of(_ends(message)))
-        states = tuple(self._maps[_run(end)] for end in _ends(message))
+        states = tuple(self._maps[run_of(end)] for end in _ends(message))
         kept = self._carried.get(runs)
-        if kept is None or kept[:2] != (message, states):
+        if kept is None or kept[:2] != (message, states) or not runs.isdisjoint(self._clashing):
             kept = message, states, tuple(self._carry(message))
             self._carried[runs] = kept
         return kept[2]
 
     def _carry(self, message: AlignmentMessage) -> Iterator[Alignment]:
-        first, second = (self._change(end) for end in _ends(message))
         for alignment in message.unpack():
-            robot, _ = parse_component(alignment.reference)
-            straight = robot == message.reference.robot
-            ours, theirs = (first, second) if straight else (second, first)
-            yield carry(alignment, ours, theirs)
+            ours, theirs = message.ends_of(alignment)
+            carried = carry(alignment, self._change(ours), self._change(theirs))
+            yield replace(
+                carried,
+                reference=self._shown(ours, alignment.reference),
+                other=self._shown(theirs, alignment.other),
+            )
+
+    def _shown(self, end: MapVersion, component: str) -> str:
+        """Return the name of a component in the joint map, whatever it was called by who found."""
+        _, number = parse_component(component)
+        run = run_of(end)
+        return component_name(name_with_boot(run) if run in self._clashing else end.robot, number)
 
     def _runs_of(self, robot: str) -> list[RobotMap]:
         return [robot_map for run, robot_map in self._maps.items() if run[0] == robot]
 
     def _remember_state(self, robot_map: RobotMap) -> None:
-        states = self._states.setdefault(_run(robot_map), {})
+        states = self._states.setdefault(run_of(robot_map), {})
         states[robot_map.version] = places_of(robot_map)
         while len(states) > REMEMBERED_STATES:
             del states[min(states)]
 
     def _change(self, source: MapVersion) -> Change:
         """Return what became of a map since the state `source`; nothing, if that is not known."""
-        now = self._maps[_run(source)]
-        then = self._states[_run(source)].get(source.version)
+        now = self._maps[run_of(source)]
+        then = self._states[run_of(source)].get(source.version)
         return Change(places_of(now) if then is None else then, now)
 
     def _raise_urgency(self, urgency: Urgency) -> None:
@@ -323,10 +353,6 @@ def pair_of(message: AlignmentMessage) -> frozenset[str]:
 
 def _ends(message: AlignmentMessage) -> tuple[MapVersion, MapVersion]:
     return message.reference, message.other
-
-
-def _run(source: RobotMap | MapVersion) -> Run:
-    return source.robot, source.boot
 
 
 def _accepted_links(message: AlignmentMessage | None) -> set[frozenset[str]]:

@@ -39,9 +39,11 @@ from mapweave_protocol.wire.messages import (
     StatusMessage,
 )
 from mapweave_protocol.wire.model import Message
-from mapweave_protocol.wire.pairs import Run
+from mapweave_protocol.wire.pairs import Run, name_with_boot, run_of
 
 M = TypeVar("M", bound=Message)
+ASKED_AFTER = 4.0  # [s] that a robot is given to see itself that its map is lacking
+
 _log = logging.getLogger(__name__)
 
 
@@ -84,7 +86,7 @@ class Intake:
         self._held_orders = held_orders_reader()
         self._heard: dict[Run, StatusMessage] = {}
         self._last_heard: dict[str, float] = {}
-        self._lacking = Lacking()
+        self._lacking = Lacking(ASKED_AFTER)
         self._assembler = MapAssembler()
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
@@ -231,12 +233,16 @@ class Intake:
             last = max(new.components)
             self._store.keep_map((new.robot, new.boot), last, received, complete)
             record(self._story.mapped(new))
-        elif self._coordinator.clashes(new) and new.boot not in self._clashing:
+            self._tell_clash(new)
+
+    def _tell_clash(self, new: RobotMap) -> None:
+        if self._coordinator.clashes(new) and new.boot not in self._clashing:
             self._clashing.add(new.boot)
             _log.warning(
-                "map of %s ignored: another run of it has components of the same numbers; start its"
-                " agent again while the coordinator is here, with the --state it had",
+                "map of %s: another run of it has components of the same numbers; this one's are"
+                " named %s/…; give each robot an id of its own",
                 new.robot,
+                name_with_boot(run_of(new)),
             )
 
     def _pack(self, robot_map: RobotMap) -> bytes | None:
@@ -250,10 +256,12 @@ class Intake:
             return None
 
     def _take_alignments(self, new: AlignmentMessage, payload: bytes, received: float) -> None:
+        reference, other = (name_with_boot(run_of(end)) for end in (new.reference, new.other))
         if self._coordinator.receive_alignments(new):
-            reference, other = (f"{end.robot}@{end.boot}" for end in (new.reference, new.other))
             self._store.add_alignments((reference, other), received, payload)
             record(self._story.aligned(new))
+        elif self._coordinator.holds(new):
+            self._store.renew_alignments((reference, other), payload)
 
     def _take_presence(self, arrival: Arrival) -> None:
         try:

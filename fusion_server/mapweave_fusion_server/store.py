@@ -15,6 +15,11 @@ from mapweave.errors import FileError
 from mapweave_fusion_server.storage.database import DamagedError, Database, UnwritableError
 from mapweave_fusion_server.storage.held import Held
 from mapweave_fusion_server.storage.ownership import own
+from mapweave_fusion_server.storage.replicas import (
+    alignments_since,
+    maps_since,
+    renew_alignments,
+)
 from mapweave_fusion_server.storage.retention import Retention
 from mapweave_fusion_server.storage.rows import Row, VersionRow, drop_versions
 from mapweave_fusion_server.storage.salvage import is_sound, salvage
@@ -178,6 +183,13 @@ class Store:
         first, second = sorted(pair)
         self._keep((first, second), "alignment", (None, received, first, second), message)
 
+    def renew_alignments(self, pair: tuple[str, str], message: bytes) -> None:
+        """Keep `message` in place of the last one of its pair, of which it says the same."""
+        try:
+            renew_alignments(self._database, pair, message)
+        except UnwritableError as error:
+            _log.warning("%s; what was found before stays", error)
+
     def last_alignments(self) -> list[bytes]:
         """Return the last message of every pair of runs, as far as it can be read."""
         numbers = self._database.rows(
@@ -192,14 +204,18 @@ class Store:
         """Keep the map of a run, a robot and a boot, in place of the last one of that run."""
         self._keep(run, "robot_map", (*run, last_component, received), message)
 
-    def map_of(self, robot: str) -> bytes | None:
-        """Return the map of a robot's last run, None when it was never heard of."""
+    def map_of(self, robot: str, boot: str | None = None) -> bytes | None:
+        """Return the map of a robot's run, by default its last; None when it was not heard of."""
         rows = self._database.rows(
-            "SELECT rowid, last_component FROM robot_map WHERE robot = ?"
-            " ORDER BY last_component DESC",
-            robot,
-        )
-        waiting = [row for row in self._held.of("robot_map") if row.values[0] == robot]
+            "SELECT rowid, last_component FROM robot_map WHERE robot = ?1"
+            " AND boot = coalesce(?2, boot) ORDER BY last_component DESC",
+            robot, boot,
+        )  # fmt: skip
+        waiting = [
+            row
+            for row in self._held.of("robot_map")
+            if row.values[0] == robot and boot in (None, row.values[1])
+        ]
         held = {int(str(row.values[2])): row.message for row in waiting}
         last = max(held, default=-1)
         for number, component in rows:
@@ -217,6 +233,14 @@ class Store:
         )
         return self._messages("robot_map", ((n, f"of {r}@{b}") for n, r, b in numbers))
 
+    def maps_since(self, version: int | None) -> list[bytes]:
+        """Return the maps of all runs, or those that are not in `version`."""
+        return self._messages("robot_map", maps_since(self._database, version))
+
+    def alignments_since(self, version: int | None) -> list[bytes]:
+        """Return the last message of every pair of runs, unless it is in `version`."""
+        return self._messages("alignment", alignments_since(self._database, version))
+
     def map_with_component(self, robot: str, component: int) -> bytes | None:
         """Return the map of the run that the component of that number is, or was, of.
 
@@ -229,6 +253,13 @@ class Store:
         )  # fmt: skip
         return next(
             iter(self._messages("robot_map", ((n, f"of {robot}") for (n,) in numbers))), None
+        )
+
+    def runs(self) -> list[tuple[str, str, int]]:
+        """Return robot, boot and last component of every run, those of a robot from its first."""
+        columns = "robot, boot, last_component"
+        return self._database.rows(
+            f"SELECT {columns} FROM robot_map ORDER BY robot, last_component"
         )
 
     def keep_marks(self, run: tuple[str, str], received: float, message: bytes) -> None:

@@ -53,4 +53,6 @@ def _as_json(config: Config) -> dict[str, dict[str, object]]:
     }
 
 
-command = Command("Show the configuration, and where each value comes from.", _configure, _run)
+command = Command(
+    "Show the configuration, and where each value comes from.", _configure, _run, "--config my.toml"
+)

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from mapweave.cli import Command
+from mapweave.commands.progress import busy
 from mapweave.io.export import EXPORT_SUFFIXES, check_export_suffix, export
 from mapweave.io.map_files import load
 
@@ -20,10 +21,14 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     check_export_suffix(options.output)
-    export(load(options.map), options.output)
+    with busy(f"writing {options.output.name}"):
+        export(load(options.map), options.output)
     return 0
 
 
 command = Command(
-    "Write a map as a picture, as geometry, as a grid or as a path.", _configure, _run
+    "Write a map as a picture, as geometry, as a grid or as a path.",
+    _configure,
+    _run,
+    "r1.json r1.geojson",
 )

@@ -1,17 +1,18 @@
 """``mapweave fuse``: robots' maps to a joint map."""
 
 import argparse
+import json
 from itertools import combinations, product
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
-from mapweave.cli import Command, add_config_argument, config_of
-from mapweave.commands.progress import track
+from mapweave.cli import Command, add_config_argument, add_json_argument, config_of
+from mapweave.commands.progress import busy, track
 from mapweave.commands.stored_joint import as_robot_maps, robots_of, with_members
 from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave.fusion.align import FusionParameters, align
-from mapweave.io.map_files import load, save
+from mapweave.io.map_files import alignment_content, load, save
 from mapweave.maps import Alignment, JointMap, RobotMap, parse_component
 from mapweave.pictures.picture import check_picture_suffix, plot
 from mapweave.team.joint_map import fuse
@@ -27,6 +28,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("others", metavar="MAP.json", type=Path, nargs="+", help="other robots'")
     parser.add_argument("--output", metavar="JOINT.json", type=Path, help="the joint map to write")
     parser.add_argument("--plot", metavar="JOINT.png", type=Path, help="the picture (png, svg)")
+    add_json_argument(parser)
     add_config_argument(parser)
 
 
@@ -39,12 +41,14 @@ def _run(options: argparse.Namespace) -> int:
     given = _read_distinct(inputs)
     maps = [m for some in given for m in _as_maps(some)]
     stored = [some for some in given if isinstance(some, JointMap)]
-    joint = with_members(fuse(maps, _compared(given, config), config), stored)
+    alignments = _compared(given, config)
+    with busy("joining"):
+        joint = with_members(fuse(maps, alignments, config), stored)
     if options.output:
         save(joint, options.output)
     if options.plot:
         plot(joint, options.plot, {m.robot: m for m in given if isinstance(m, RobotMap)})
-    for line in tell(joint):
+    for line in [json.dumps(_content(joint))] if options.json else tell(joint):
         print(line)  # noqa: T201
     robots = set().union(*(_robots(some) for some in given))
     return 0 if _all_joined(joint, robots) else EXIT_NOT_ALL_JOINED
@@ -84,6 +88,21 @@ def _compared(given: list[RobotMap | JointMap], config: Config) -> list[Alignmen
     return [a for one, other in track(pairs, "comparing") for a in align(one, other, parameters)]
 
 
+def _content(joint: JointMap) -> dict[str, object]:
+    """Return what `tell` does, as values."""
+    return {
+        "alignments": [alignment_content(alignment) for alignment in joint.alignments],
+        "components": [
+            {
+                "robots": {name: pose.tolist() for name, pose in component.robots.items()},
+                "confidence": component.confidence,
+                "segments": len(component.map.segments),
+            }
+            for component in joint.components
+        ],
+    }
+
+
 def tell(joint: JointMap) -> list[str]:
     """Return what was found, a line an alignment and a line a component."""
     return [*map(_tell_alignment, joint.alignments), *_tell_components(joint)]
@@ -112,4 +131,9 @@ def _all_joined(joint: JointMap, robots: set[str]) -> bool:
     )
 
 
-command = Command("Join robots' maps where what both saw proves it.", _configure, _run)
+command = Command(
+    "Join robots' maps where what both saw proves it.",
+    _configure,
+    _run,
+    "a.json b.json --output joint.json --plot joint.png",
+)

@@ -1,6 +1,7 @@
 """``mapweave map``: a laser log to a robot's map."""
 
 import argparse
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,11 +10,12 @@ from mapweave.atomic import check_outputs
 from mapweave.cli import (
     Command,
     add_config_argument,
+    add_json_argument,
     add_topic_argument,
     argument,
     config_of,
 )
-from mapweave.commands.progress import track
+from mapweave.commands.progress import busy, track
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import FileError
@@ -21,7 +23,7 @@ from mapweave.garbage import spared
 from mapweave.ids import check_id
 from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save
-from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import STANDARD_INPUT, ScanSource, open_source
 from mapweave.mapping.grids.grid_map import map_of_grid
@@ -55,14 +57,17 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--odometry",
-        choices=["none", "prior"],
+        type=argument(OdometryChoice.parse),
         default="none",
-        help="let the log's odometry help; what was seen decides (%(default)s)",
+        metavar="WHICH",
+        help="let odometry help; what was seen decides: none, prior for that of the log, or a"
+        " bag's topic, such as /odom or /tf (default %(default)s)",
     )
     add_start_arguments(parser)
     parser.add_argument(
         "--plot", metavar="MAP.png", type=Path, help="the picture to write (png, svg)"
     )
+    add_json_argument(parser)
     add_config_argument(parser)
 
 
@@ -78,14 +83,22 @@ def _run(options: argparse.Namespace) -> int:
     start = Start.of(options)
     if is_grid(Path(options.log)):
         return _run_grid(options, config)
-    step, prior = config.sensor.angular_step, options.odometry == "prior"
-    source = open_source(options.log, ReadOptions(prior, step, options.topic, _warn))
+    source = open_source(options.log, _read_options(options, config))
     mapper = _mapper(options.robot, start, config)
     robot_map, taken = _map_all(options, source, mapper)
     _check_placed(options, _new(robot_map, start), taken)
     _write(options, robot_map)
-    print(_summary(_new(robot_map, start), taken))  # noqa: T201
+    figures = _figures(_new(robot_map, start), taken)
+    print(json.dumps(figures) if options.json else _sentence(figures))  # noqa: T201
     return 0
+
+
+def _read_options(options: argparse.Namespace, config: Config) -> ReadOptions:
+    odometry: OdometryChoice = options.odometry
+    if odometry.live:
+        raise FileError(options.log, f"has no live odometry; expected {odometry.topic} of a bag")
+    step = config.sensor.angular_step
+    return ReadOptions(odometry.prior, step, options.topic, _warn, odometry_topic=odometry.topic)
 
 
 def _run_grid(options: argparse.Namespace, config: Config) -> int:
@@ -93,12 +106,15 @@ def _run_grid(options: argparse.Namespace, config: Config) -> int:
     for given, name in ((options.continued, "--continue"), (options.localize, "--localize")):
         if given is not None:
             raise FileError(options.log, f"is a grid; expected a log to take {name} with")
-    robot_map = map_of_grid(read_grid(Path(options.log)), options.robot or ROBOT, config)
+    with busy(f"reading {Path(options.log).name}"):
+        robot_map = map_of_grid(read_grid(Path(options.log)), options.robot or ROBOT, config)
     if not robot_map.submaps:
         raise FileError(options.log, "no wall of it can be seen from its free cells; expected some")
     _write(options, robot_map)
     lines = robot_map.submaps[0].map
-    print(f"{len(lines.polylines)} polylines, {len(lines.segments)} segments")  # noqa: T201
+    figures = {"polylines": len(lines.polylines), "segments": len(lines.segments)}
+    sentence = "{polylines} polylines, {segments} segments".format(**figures)
+    print(json.dumps(figures) if options.json else sentence)  # noqa: T201
     return 0
 
 
@@ -159,17 +175,32 @@ def _warn(message: str) -> None:
     print(f"mapweave: {message}", file=sys.stderr)  # noqa: T201
 
 
-def _summary(robot_map: RobotMap, taken: int) -> str:
+def _figures(robot_map: RobotMap, taken: int) -> dict[str, float]:
+    """Return what there is to say of a map, by name."""
     sizes = dict.fromkeys(robot_map.components, 0)
     for submap in robot_map.submaps:
         sizes[submap.component] += len(submap.trajectory.scan_index)
-    segments = sum(len(submap.map.segments) for submap in robot_map.submaps)
-    path = sum(submap.trajectory.length for submap in robot_map.submaps)
+    return {
+        "scans": taken,
+        "placed": sum(sizes.values()),
+        "largest": max(sizes.values()),
+        "components": len(sizes),
+        "path_m": round(sum(submap.trajectory.length for submap in robot_map.submaps), 1),
+        "submaps": len(robot_map.submaps),
+        "segments": sum(len(submap.map.segments) for submap in robot_map.submaps),
+    }
+
+
+def _sentence(figures: dict[str, float]) -> str:
     return (
-        f"{sum(sizes.values())} of {taken} scans placed, {max(sizes.values())} in the largest of"
-        f" {len(sizes)} components; {path:.0f} m of path, {len(robot_map.submaps)} submaps,"
-        f" {segments} segments"
-    )
+        "{placed} of {scans} scans placed, {largest} in the largest of {components} components;"
+        " {path_m:.0f} m of path, {submaps} submaps, {segments} segments"
+    ).format(**figures)
 
 
-command = Command("Map a laser log without odometry.", _configure, _run)
+command = Command(
+    "Map a laser log without odometry.",
+    _configure,
+    _run,
+    "robot.log --output r1.json --plot r1.png",
+)

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 from rich.console import Console
@@ -34,6 +35,25 @@ def track(items: Iterable[Item], description: str, total: int | None = None) -> 
         return
     with _bar() as progress:
         yield from progress.track(items, total=total, description=description)
+
+
+@contextmanager
+def busy(description: str) -> Iterator[None]:
+    """Show that something is being done of which nobody knows how long it takes."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    # What is printed meanwhile is left alone.
+    spinner = Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        console=Console(stderr=True),
+        transient=True,
+        redirect_stdout=False,
+    )
+    with spinner:
+        spinner.add_task(description, total=None)
+        yield
 
 
 def _bar() -> Progress:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.mapping.localization.known_map import held_by_submap
 from mapweave.maps import (
     JointComponent,
     JointMap,
@@ -17,6 +18,7 @@ from mapweave.maps import (
     Trajectory,
     parse_component,
 )
+from mapweave.marks import Mark
 
 BOOT = "joint"
 
@@ -24,13 +26,19 @@ BOOT = "joint"
 def as_robot_maps(joint: JointMap) -> list[RobotMap]:
     """Return the components of `joint` as maps of their first robots."""
     submaps: dict[str, list[Submap]] = {}
+    marks: dict[str, list[Mark]] = {}
     for component in joint.components:
         name = _first(component)
         robot, number = parse_component(name)
         of_robot = submaps.setdefault(robot, [])
+        held = marks.setdefault(robot, [])
+        held += [held_by_submap(mark, len(of_robot), mark.position) for mark in component.marks]
         frame = se2.inverse(component.robots[name])
         of_robot.append(Submap(len(of_robot), number, frame, component.map, Trajectory.empty()))
-    return [RobotMap(robot, BOOT, joint.version, tuple(s)) for robot, s in submaps.items()]
+    return [
+        RobotMap(robot, BOOT, joint.version, tuple(found), marks=tuple(marks[robot]))
+        for robot, found in submaps.items()
+    ]
 
 
 def robots_of(joint: JointMap) -> set[str]:
@@ -44,8 +52,14 @@ def with_members(fused: JointMap, stored: Sequence[JointMap]) -> JointMap:
     Their alignments come first, as they were decided then.
     """
     members = {_first(c): c.robots for joint in stored for c in joint.components}
+    named = {m.id: m.component for joint in stored for c in joint.components for m in c.marks}
     components = tuple(
-        replace(c, robots=_with_members(c.robots, members)) for c in fused.components
+        replace(
+            c,
+            robots=_with_members(c.robots, members),
+            marks=tuple(replace(m, component=named.get(m.id, m.component)) for m in c.marks),
+        )
+        for c in fused.components
     )
     decided = tuple(alignment for joint in stored for alignment in joint.alignments)
     return replace(fused, components=components, alignments=(*decided, *fused.alignments))

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from mapweave.errors import FileError
 from mapweave.geometry.arguments import check_kind
-from mapweave.io.exporters import dxf, geojson, map_server, tum
+from mapweave.io.exporters import dxf, geojson, map_server, mcap, tum
 from mapweave.maps import JointMap, RobotMap
 from mapweave.pictures.picture import PICTURE_SUFFIXES, plot
 
 WRITERS: dict[str, Callable[[RobotMap | JointMap, Path], None]] = {
     **dict.fromkeys(PICTURE_SUFFIXES, plot),
-    **{form.SUFFIX: form.write for form in (geojson, dxf, map_server, tum)},
+    **{form.SUFFIX: form.write for form in (geojson, dxf, map_server, tum, mcap)},
 }
 """Suffix to what writes such a file, whole or not at all."""
 
@@ -28,7 +28,7 @@ def export(some_map: RobotMap | JointMap, path: str | Path) -> None:
     path
         The file to write: ``.svg`` or ``.png`` for a picture, ``.geojson`` or ``.dxf`` for the
         geometry, ``.yaml`` for a grid (its cells in a ``.pgm`` beside it), ``.tum`` for a robot's
-        path.
+        path, ``.mcap`` for a recording of the drive in Foxglove.
 
     Raises
     ------
@@ -36,7 +36,8 @@ def export(some_map: RobotMap | JointMap, path: str | Path) -> None:
         If `path` has another suffix, the map does not hold what it is to show, or it cannot be
         written.
     MissingExtraError
-        If a package that it takes is not installed: matplotlib for pictures, ezdxf for DXF.
+        If a package that it takes is not installed: matplotlib for pictures, ezdxf for DXF,
+        foxglove-sdk for MCAP.
     ArgumentError
         If it is no map.
     """

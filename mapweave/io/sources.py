@@ -100,7 +100,7 @@ class Recording:
         """As `read_scans`."""
         return read_scans(
             self.path,
-            odometry=self.options.odometry,
+            odometry=self.options.odometry_topic or self.options.odometry,
             angular_step=self.options.angular_step,
             topic=self.options.topic,
             on_warning=self.options.on_warning,

@@ -10,12 +10,26 @@ import numpy as np
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import RobotMap, Submap
+from mapweave.marks import Mark
 
 
 def to_continue(known: RobotMap | None) -> tuple[Submap, ...]:
     """Return the submaps of a map that a run goes on from, their ids from 0; none without one."""
     submaps = () if known is None else known.submaps
     return tuple(replace(submap, id=number) for number, submap in enumerate(submaps))
+
+
+def marks_to_continue(known: RobotMap | None) -> tuple[Mark, ...]:
+    """Return the marks of a map that a run goes on from, held by the submaps of `to_continue`."""
+    if known is None:
+        return ()
+    number = {submap.id: k for k, submap in enumerate(known.submaps)}
+    return tuple(
+        replace(mark, anchor=replace(mark.anchor, submap=number.get(mark.anchor.submap, 0)))
+        for mark in known.marks
+        # Where a scan holds it the submap's number may be one from before it was cut.
+        if mark.anchor.scan is not None or mark.anchor.submap in number
+    )
 
 
 def first_component(submaps: Sequence[Submap]) -> int:

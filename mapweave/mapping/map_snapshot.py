@@ -10,6 +10,7 @@ from functools import cached_property
 
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.maps import LineMap, MadeWith, RobotMap, Submap
+from mapweave.marks import Mark
 
 
 class Unsettled:
@@ -47,6 +48,8 @@ class MapSnapshot:
         The submap that grows, without its lines.
     builder
         What builds it, pickled.
+    marks
+        Those of the map that the run goes on from.
     """
 
     robot: str
@@ -57,6 +60,7 @@ class MapSnapshot:
     unsettled: Unsettled | None
     growing: Submap | None
     builder: bytes
+    marks: tuple[Mark, ...] = ()
 
     @classmethod
     def packed(cls, builder: SubmapBuilder) -> bytes:
@@ -74,4 +78,5 @@ class MapSnapshot:
         if self.growing is not None:
             builder: SubmapBuilder = pickle.loads(self.builder)  # our own, of a moment ago
             submaps.append(replace(self.growing, map=builder.line_map()))
-        return RobotMap(self.robot, self.boot, self.version, tuple(submaps), self.made_with)
+        made_with, marks = self.made_with, self.marks
+        return RobotMap(self.robot, self.boot, self.version, tuple(submaps), made_with, marks)

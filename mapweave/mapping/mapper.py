@@ -16,11 +16,12 @@ from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
-from mapweave.mapping.continuation import first_component, scans_in, to_continue
+from mapweave.mapping.continuation import first_component, marks_to_continue, scans_in, to_continue
 from mapweave.mapping.map_snapshot import MapSnapshot, Unsettled, with_walls
 from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
+from mapweave.mapping.tracking.deskewing import Deskewer
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
 from mapweave.mapping.tracking.pose_covariance import (
     EXACT,
@@ -109,6 +110,7 @@ class Mapper:
         self._version = 0
         self._finished = list(to_continue(known))
         self._known = len(self._finished)  # submaps, of an earlier run
+        self._marks = marks_to_continue(known)
         self._component = self._newest_component = first_component(self._finished)
         self._on_warning = on_warning
         self._body = OwnBody(self.parameters.own_body)
@@ -117,6 +119,7 @@ class Mapper:
         # Raw scans so far, as long as no submap is finished.
         self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._tracker = Tracker(self.parameters.tracker)
+        self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
@@ -182,7 +185,8 @@ class Mapper:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap(self._growing.line_map())]
         submaps = (*with_walls(self._finished, self._unsettled), *growing)
-        return RobotMap(self.robot, self.boot, self._version, submaps, self._made_with)
+        made_with, marks = self._made_with, self._marks
+        return RobotMap(self.robot, self.boot, self._version, submaps, made_with, marks)
 
     def snapshot(self) -> MapSnapshot:
         """Return what `robot_map` would draw now, to be drawn by another thread: takes a moment."""
@@ -196,6 +200,7 @@ class Mapper:
             self._unsettled,
             None if empty else self._submap(LineMap.empty()),
             b"" if empty else MapSnapshot.packed(self._growing),
+            self._marks,
         )
 
     @property
@@ -221,7 +226,8 @@ class Mapper:
         """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
         if not self._has_finished:
             self._early.append(scan)
-        seen = self.seen = observe(self._body.without(scan), self.parameters.observation)
+        straight = self._deskewer.straight(self._body.without(scan))
+        seen = self.seen = observe(straight, self.parameters.observation)
         self._waiting.append(seen)
         placed = lost = False
         for _ in range(AT_ONCE):
@@ -235,6 +241,8 @@ class Mapper:
         """Follow the robot to the first scan that waits; return the same of it."""
         seen = self._waiting.popleft()
         placed = self._place(seen)
+        if placed:
+            self._deskewer.placed(seen.scan.stamp, self._tracker.pose)
         if len(self._tracker.missed) < self._patience(seen):
             return placed, False
         self._start_again()
@@ -261,6 +269,7 @@ class Mapper:
         self._early.clear()
         self._waiting.clear()
         self._tracker = Tracker(self.parameters.tracker)
+        self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin = self._frame = se2.IDENTITY
         self._merged = {}
@@ -288,7 +297,8 @@ class Mapper:
     def _whereabouts(self) -> tuple[FloatArray, FloatArray]:
         """Return (3,) where the last scan was placed and (4,) how surely, component frame."""
         turned = turn_uncertainty(self._held, self._origin[2])
-        return se2.compose(self._origin, self._tracker.pose), turned
+        at_stamp = se2.compose(self._tracker.pose, self._deskewer.to_stamp)
+        return se2.compose(self._origin, at_stamp), turned
 
     def _merge_all(self, found: Found) -> None:
         for seen, tracked in found:
@@ -315,6 +325,7 @@ class Mapper:
             self._component = self._newest_component = self._spare() + (self._unsettled is not None)
         self._follows = False
         self._tracker = self._tracker.afresh()
+        self._deskewer = Deskewer()
         self._origin = self._frame = se2.IDENTITY
 
     def _merge(self, seen: Observation, tracked: ScanMatch) -> None:

@@ -40,6 +40,10 @@ class Scan:
         When it was taken [s]; NaN where the log gives no usable time.
     odometry
         (3,) the robot's own guess of its pose [m, m, rad], only where it was asked for.
+    sweep
+        [s] from the first beam to the last; 0 where all are of one instant, or it is not known.
+        Negative where the last one was taken first, as by a sensor that turns clockwise: `stamp` is
+        of the beam that was taken first.
 
     Raises
     ------
@@ -59,6 +63,7 @@ class Scan:
     index: int
     stamp: float
     odometry: FloatArray | None
+    sweep: float
 
     def __init__(
         self,
@@ -67,8 +72,10 @@ class Scan:
         index: int = UNNUMBERED,
         stamp: float = math.nan,
         odometry: ArrayLike | None = None,
+        sweep: float = 0.0,
     ) -> None:
-        measured, directions = _ascending(*_of_one_length(ranges, angles))
+        given = _of_one_length(ranges, angles)
+        measured, directions = _ascending(*given)
         _check_directions(directions)
         returned = np.where((measured > 0) & (measured < np.inf), measured, np.nan)
         keep = object.__setattr__  # only here: the instance is frozen
@@ -77,6 +84,7 @@ class Scan:
         keep(self, "index", _index(index))
         keep(self, "stamp", _stamp(stamp))
         keep(self, "odometry", None if odometry is None else _pose("odometry", odometry))
+        keep(self, "sweep", _sweep(sweep if directions is given[1] else -sweep))
 
     @classmethod
     def of(
@@ -90,6 +98,7 @@ class Scan:
         index: int = UNNUMBERED,
         stamp: float = math.nan,
         odometry: ArrayLike | None = None,
+        time_increment: float = 0.0,
     ) -> "Scan":
         """Return a scan from what drivers state, such as a ROS ``LaserScan``.
 
@@ -105,6 +114,8 @@ class Scan:
             [m] readings below or above are no returns.
         index, stamp, odometry
             As of `Scan`.
+        time_increment
+            From each beam to the next [s]; 0 where it is not known.
 
         Raises
         ------
@@ -125,7 +136,8 @@ class Scan:
         given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
         used = np.where((given >= low) & (given <= high), given, np.nan)
         angles = first + step * np.arange(given.size, dtype=np.float64)
-        return cls(used, angles, index, stamp, odometry)
+        sweep = as_number("time_increment", time_increment, "expected a time [s]")
+        return cls(used, angles, index, stamp, odometry, sweep * max(given.size - 1, 0))
 
     @property
     def hits(self) -> BoolArray:
@@ -216,6 +228,13 @@ def _stamp(value: float) -> float:
     if stamp.ndim:
         raise ArgumentError("stamp", f"expected a time [s], got {value!r}")
     return float(stamp) if np.isfinite(stamp) else math.nan
+
+
+def _sweep(value: float) -> float:
+    """Return it; ArgumentError if it is not finite."""
+    if not math.isfinite(value):
+        raise ArgumentError("sweep", f"expected a time [s], got {value}")
+    return float(value)
 
 
 def _pose(argument: str, value: ArrayLike) -> FloatArray:

@@ -5,8 +5,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from mapweave.scan.mounting import Mounting
 from mapweave_ros.errors import Ros2SourceError
-from mapweave_ros.mounting import Mounting
 from mapweave_ros.network import SCHEME, Ros2Network
 
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -14,7 +14,7 @@ _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 @dataclass(frozen=True, slots=True)
 class Laser:
-    """A laser's topic, and where the laser is on the robot; None where that was not said."""
+    """A laser's topic, and where the laser is on the robot; None where ``/tf_static`` says it."""
 
     topic: str
     mounting: Mounting | None = None
@@ -27,7 +27,7 @@ class Ros2Address:
     Attributes
     ----------
     lasers
-        One, or several that each say where they sit.
+        One or several.
     network
         Where.
     """
@@ -71,6 +71,3 @@ def _check_lasers(name: str, lasers: Sequence[Laser]) -> None:
     topics = [laser.topic for laser in lasers]
     if len(set(topics)) < len(topics):
         raise Ros2SourceError(name, "names a topic twice")
-    bare = [laser.topic for laser in lasers if laser.mounting is None]
-    if len(lasers) > 1 and bare:
-        raise Ros2SourceError(name, f"of several lasers, {bare[0]} does not say where it sits")

@@ -84,4 +84,9 @@ class _Following:
             self._over.set()
 
 
-command = Command("Show a team's joint map and poses on a ROS 2 network.", _configure, _run)
+command = Command(
+    "Show a team's joint map and poses on a ROS 2 network.",
+    _configure,
+    _run,
+    "--team rescue --to 'ros2:?connect=tcp/localhost:7447'",
+)

@@ -1,5 +1,7 @@
 """``sensor_msgs/LaserScan`` off the wire, to a scan; what is none is refused in words."""
 
+from typing import Any
+
 from mapweave.errors import MissingExtraError
 from mapweave.io.readers.ros_bags.laser_messages import (
     CDR,
@@ -13,6 +15,7 @@ from mapweave_ros.topics import DDS_LASER_SCAN
 
 MAX_BYTES = 2**20  # of a message: ten thousand beams and their intensities are a tenth of it
 MIN_BEAMS = 10  # fewer show no wall
+NOISE = (AssertionError, TypeError, MemoryError)  # what rosbags makes of it
 
 
 class ScanMessages:
@@ -31,7 +34,13 @@ class ScanMessages:
             raise MissingExtraError("a ROS 2 topic", "ros2") from error
 
     def scan(self, topic: str, dds_type: str | None, payload: bytes, index: int) -> Scan:
-        """Return the scan in `payload`.
+        """Return the scan in `payload`; as `framed_scan`."""
+        return self.framed_scan(topic, dds_type, payload, index)[1]
+
+    def framed_scan(
+        self, topic: str, dds_type: str | None, payload: bytes, index: int
+    ) -> tuple[str, Scan]:
+        """Return the laser's frame, and the scan in `payload`.
 
         Parameters
         ----------
@@ -47,14 +56,32 @@ class ScanMessages:
         """
         if dds_type not in (None, DDS_LASER_SCAN):
             raise UnreadableMessageError(f"is a {dds_type}; expected a {DDS_LASER_SCAN}")
-        if len(payload) > MAX_BYTES:
-            raise UnreadableMessageError(f"has {len(payload)} bytes; expected at most {MAX_BYTES}")
+        _check_size(payload)
         try:
-            scan = self._decoder.scan(Message(topic, LASER_SCAN, CDR, payload), index)
-        except (AssertionError, TypeError, MemoryError) as error:  # what rosbags makes of noise
+            frame, scan = self._decoder.framed_scan(Message(topic, LASER_SCAN, CDR, payload), index)
+        except NOISE as error:
             raise UnreadableMessageError("is no LaserScan") from error
         if len(scan.ranges) < MIN_BEAMS:
             raise UnreadableMessageError(
                 f"has {len(scan.ranges)} beams; expected {MIN_BEAMS} or more"
             )
-        return scan
+        return frame, scan
+
+    def decode(self, topic: str, kind: str, payload: bytes) -> Any:  # noqa: ANN401 - made at run time
+        """Return another message, of a `kind` such as ``nav_msgs/msg/Odometry``.
+
+        Raises
+        ------
+        UnreadableMessageError
+            If it is none.
+        """
+        _check_size(payload)
+        try:
+            return self._decoder.decode(Message(topic, kind, CDR, payload), kind)
+        except NOISE as error:
+            raise UnreadableMessageError(f"is no {kind}") from error
+
+
+def _check_size(payload: bytes) -> None:
+    if len(payload) > MAX_BYTES:
+        raise UnreadableMessageError(f"has {len(payload)} bytes; expected at most {MAX_BYTES}")

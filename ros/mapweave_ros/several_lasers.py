@@ -11,8 +11,8 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
-from mapweave_ros.mounting import Mounting
 
 MIN_STEP = math.radians(0.1)  # [rad] between beams of a view
 MAX_STEP = math.radians(2.0)

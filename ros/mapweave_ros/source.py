@@ -10,12 +10,14 @@ import zenoh
 
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags.frames import TF_STATIC
 from mapweave.io.readers.ros_bags.laser_messages import UnreadableMessageError
+from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
 from mapweave_protocol.link.inbox import Arrival, Inbox
 from mapweave_ros.address import Laser, Ros2Address
+from mapweave_ros.beside_scans import BesideScans
 from mapweave_ros.graph import topics_of_type
-from mapweave_ros.mounting import Mounting
 from mapweave_ros.output import open_when_there
 from mapweave_ros.refusals import Refusals
 from mapweave_ros.scan_messages import ScanMessages
@@ -24,6 +26,7 @@ from mapweave_ros.topics import DDS_LASER_SCAN, TopicKeys
 
 POLL = 0.1  # [s] after which it is noticed that nobody wants any more
 SILENT = 5.0  # [s] without a scan, after which it is said what else there is
+BEFORE = 0.3  # [s] for what is latched to come, before lasers are heard
 FORGOTTEN = 2.0  # [s] after which another publisher of a topic is listened to
 
 
@@ -39,7 +42,8 @@ def open_ros2(name: str, options: ReadOptions) -> "Ros2Source":
     MissingExtraError
         If `rosbags` is not installed.
     """
-    return Ros2Source(Ros2Address.parse(name, options.network), options.on_warning)
+    address = Ros2Address.parse(name, options.network)
+    return Ros2Source(address, options.on_warning, options.odometry_topic)
 
 
 class Ros2Source:
@@ -51,12 +55,20 @@ class Ros2Source:
         Of the lasers.
     on_warning
         Told what is refused, and where nothing comes.
+    odometry
+        The topic of odometry on the same network that may help; None for none.
     """
 
     live = True
 
-    def __init__(self, address: Ros2Address, on_warning: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        address: Ros2Address,
+        on_warning: Callable[[str], None],
+        odometry: str | None = None,
+    ) -> None:
         self._address = address
+        self._odometry = odometry
         self._tell = on_warning
         self._messages = ScanMessages()
         self._closed = threading.Event()
@@ -85,21 +97,36 @@ class Ros2Source:
             session = open_when_there(stack, self._address.network, self._closed.is_set)
             if session is None:
                 return
-            topics = [
-                _Topic(laser, self._address.network.domain, self._tell) for laser in self._lasers
-            ]
+            domain = self._address.network.domain
+            topics = [_Topic(laser, domain, self._tell) for laser in self._lasers]
+            beside = BesideScans(self._messages, domain, self._odometry, self._tell)
+            beside.subscribe(session, inbox.put, stack)
+            self._hear_transforms(inbox, beside)
             for key in (key for topic in topics for key in topic.keys):
                 stack.enter_context(session.declare_subscriber(key, inbox.put))
-            yield from self._combined(self._heard(session, inbox, topics))
+            heard = self._heard(session, inbox, topics, beside)
+            yield from self._combined(heard, beside)
+
+    def _hear_transforms(self, inbox: Inbox, beside: BesideScans) -> None:
+        """Take what is said before the first scan, as transforms are that do not change."""
+        until = time.monotonic() + BEFORE
+        while not self._closed.is_set() and (left := until - time.monotonic()) > 0:
+            arrival = inbox.get(left)
+            if arrival is not None:
+                beside.takes(arrival)
 
     @property
     def _lasers(self) -> tuple[Laser, ...]:
         return self._address.lasers
 
     def _heard(
-        self, session: zenoh.Session, inbox: Inbox, topics: list["_Topic"]
-    ) -> Iterator[tuple[Laser, Scan]]:
-        """Yield the scans of each laser."""
+        self,
+        session: zenoh.Session,
+        inbox: Inbox,
+        topics: list["_Topic"],
+        beside: BesideScans,
+    ) -> Iterator[tuple[str, Mounting, Scan]]:
+        """Yield the scans of each laser: its topic, where it sits, and what it measured."""
         silent_at, scans = time.monotonic() + SILENT, 0
         while not self._closed.is_set():
             arrival = inbox.get(POLL)
@@ -108,22 +135,31 @@ class Ros2Source:
                     self._tell_silence(session)
                     silent_at = float("inf")
                 continue
+            if beside.takes(arrival):
+                continue
             topic = next(topic for topic in topics if topic.has(arrival))
-            scan = topic.scan(arrival, self._messages, scans)
-            if scan is not None:
-                silent_at, scans = float("inf"), scans + 1
-                yield topic.laser, scan
+            found = topic.scan(arrival, self._messages, scans)
+            if found is None:
+                continue
+            silent_at = float("inf")
+            mounting = topic.mounting(found[0], beside, alone=len(topics) == 1)
+            if mounting is not None:
+                scans += 1
+                yield topic.laser.topic, mounting, found[1]
 
-    def _combined(self, heard: Iterator[tuple[Laser, Scan]]) -> Iterator[Scan]:
+    def _combined(
+        self, heard: Iterator[tuple[str, Mounting, Scan]], beside: BesideScans
+    ) -> Iterator[Scan]:
         """Yield scans as the robot has them; one for several that belong together."""
-        mountings = {laser.topic: laser.mounting or Mounting() for laser in self._lasers}
-        if len(mountings) == 1:
-            for laser, scan in heard:
-                yield mountings[laser.topic].turned(scan)
-            return
+        mountings = {laser.topic: Mounting() for laser in self._lasers}
         together = SeveralLasers(mountings)
-        for laser, scan in heard:
-            yield from together.add(laser.topic, scan)
+        for topic, mounting, scan in heard:
+            if len(mountings) == 1:
+                yield beside.with_odometry(mounting.turned(scan), mounting)
+                continue
+            mountings[topic] = mounting
+            for view in together.add(topic, scan):
+                yield beside.with_odometry(view, Mounting())
 
     def _tell_silence(self, session: zenoh.Session) -> None:
         there = topics_of_type(session, self._address.network.domain, DDS_LASER_SCAN, POLL)
@@ -142,6 +178,7 @@ class _Topic:
         self._native = zenoh.KeyExpr(self._names.native)
         self._refusals = Refusals(laser.topic, tell)
         self._key = ""
+        self._mounting: Mounting | None = None
         self._heard = 0.0
 
     @property
@@ -153,14 +190,28 @@ class _Topic:
         key = arrival.key
         return key == self._names.bridged or self._native.includes(zenoh.KeyExpr(key))
 
-    def scan(self, arrival: Arrival, messages: ScanMessages, index: int) -> Scan | None:
-        """Return the scan in `arrival`; None where it was refused, or said twice over."""
+    def mounting(self, frame: str, beside: BesideScans, *, alone: bool) -> Mounting | None:
+        """Return where the laser sits: as it was said, or as transforms say it.
+
+        None where that is not known, and needed: of several lasers. What is known at first holds: a
+        laser that were turned round while it maps would map nothing.
+        """
+        if self._mounting is None:
+            self._mounting = self.laser.mounting or beside.mounting(self.laser.topic, frame)
+        if self._mounting is None and alone:
+            self._mounting = Mounting()
+        if self._mounting is None:
+            self._refusals.add(f"nothing on {TF_STATIC} says where its frame {frame!r} sits")
+        return self._mounting
+
+    def scan(self, arrival: Arrival, messages: ScanMessages, index: int) -> tuple[str, Scan] | None:
+        """Return frame and scan in `arrival`; None where it was refused, or said twice over."""
         now = time.monotonic()
         if arrival.key != self._key and now - self._heard < FORGOTTEN:
             return None  # as where a bridge says again what rmw_zenoh has said
         try:
             dds_type = self._names.type_at(arrival.key)
-            scan = messages.scan(self.laser.topic, dds_type, arrival.payload, index)
+            scan = messages.framed_scan(self.laser.topic, dds_type, arrival.payload, index)
         except UnreadableMessageError as error:
             self._refusals.add(str(error))
             return None

@@ -1,6 +1,6 @@
 """Who compares what, when: no clock, no network."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from hypothesis import given, settings
@@ -10,7 +10,14 @@ from mapweave.maps import Alignment, Decision, LineMap, RobotMap, Submap, Trajec
 from mapweave.reasons import Reason
 from mapweave_agent.comparison_schedule import Comparison, ComparisonSchedule
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
-from mapweave_protocol.wire.messages import AlignmentMessage, Compared, MapVersion
+from mapweave_protocol.link.lacking import GRACE
+from mapweave_protocol.wire.joint_status_message import Place
+from mapweave_protocol.wire.messages import (
+    AlignmentMessage,
+    Compared,
+    JointStatusMessage,
+    MapVersion,
+)
 from mapweave_protocol.wire.pairs import responsible
 
 PARAMETERS = AgentParameters(comparison_interval=5.0, comparison_rest=2.0)
@@ -194,7 +201,7 @@ def test_a_run_is_compared_with_the_one_before_it_once_for_each_of_its_maps() ->
 
 
 def test_a_map_of_an_earlier_run_of_a_peer_does_not_replace_that_of_the_later() -> None:
-    plan = plan_of("a", "b")
+    plan = ComparisonSchedule("a", PARAMETERS)
     for robot_map in (a_run("b", 1, "now"), a_run("b", 0, "before")):
         plan.peer_map(robot_map)
     assert plan.held == (MapVersion(robot="b", boot="now", version=1),)
@@ -281,3 +288,74 @@ def test_a_finished_submap_is_published_at_once_and_growth_at_a_bounded_rate() -
     assert plan.due(0.1)
     plan.published(0.1)
     assert not plan.due(0.2)
+
+
+def joined(*names: str) -> JointStatusMessage:
+    """Return the status of a coordinator whose joint map has these components as one."""
+    place = Place(frame=names[0], pose=(0.0, 0.0, 0.0))
+    return coordinator_status(frames=dict.fromkeys(names, place))
+
+
+def coordinator_status(**fields: object) -> JointStatusMessage:
+    said = {"boot": "c", "stamp": 0.0, "series": "s", "version": 1, "pending": False}
+    return JointStatusMessage.model_validate(said | fields)
+
+
+def test_runs_that_are_over_are_compared_by_their_robot_until_they_are_joined() -> None:
+    plan = ComparisonSchedule(SECOND, PARAMETERS)  # not the one that compares what is alive
+    plan.earlier_map(a_run(SECOND, 0, "before"))
+    plan.own_map(a_run(SECOND, 1, "now"), finished=True)
+    plan.peer_here(FIRST, "x")
+    plan.peer_map(a_run(FIRST, 0, "x"))
+    pairs = set()
+    while (comparison := plan.begin(1e9)) is not None:
+        pairs.add(frozenset({comparison.reference.boot, comparison.other.boot}))
+        plan.done(comparison, 1e9, 0.0)
+    assert pairs == {frozenset({"before", "now"}), frozenset({"before", "x"})}
+    plan.own_map(replace(a_run(SECOND, 1, "now"), version=2), finished=True)
+    plan.coordinator(joined(f"{SECOND}/0", f"{SECOND}/1"))
+    assert plan.idle
+
+
+def test_what_a_coordinator_holds_of_a_pair_is_not_compared_again() -> None:
+    plan = plan_of(FIRST, SECOND)
+    states = [MapVersion(robot=robot, boot="x", version=1) for robot in ("a", "b")]
+    plan.coordinator(coordinator_status(alignments=(tuple(states),)))
+    assert plan.idle
+
+
+def test_maps_of_robots_that_are_gone_are_asked_for_until_they_are_here() -> None:
+    plan = ComparisonSchedule(SECOND, PARAMETERS)
+    plan.own_map(a_run(SECOND, 0, "now"), finished=True)
+    state = MapVersion(robot=FIRST, boot="x", version=1)
+    for now in (0.0, GRACE):
+        plan.coordinator(coordinator_status(maps=(state,)))
+        assert plan.to_ask_for(now) == ([] if now < GRACE else [state])
+    plan.peer_map(a_run(FIRST, 0, "x"))
+    assert plan.to_ask_for(10 * GRACE) == []
+    assert not plan.idle  # it is gone, so it is for us to compare
+    plan.peer_here(FIRST, "x")
+    plan.coordinator(coordinator_status(maps=(state,)))
+    assert plan.idle
+
+
+def test_of_two_with_one_id_the_one_of_the_smaller_boot_compares_them() -> None:
+    plans = {boot: ComparisonSchedule("a", PARAMETERS) for boot in ("x", "y")}
+    for own, other in ("xy", "yx"):
+        plans[own].own_map(a_run("a", 0, own), finished=True)
+        plans[own].peer_here("a", other)
+        plans[own].peer_map(a_run("a", 0, other))
+    assert plans["y"].idle
+    comparison = plans["x"].begin(1e9)
+    assert comparison is not None
+    assert {comparison.reference.boot, comparison.other.boot} == {"x", "y"}
+
+
+def test_what_a_robot_found_that_is_gone_is_told_in_our_name() -> None:
+    first, second = plan_of(FIRST, SECOND), plan_of(SECOND, FIRST)
+    comparison = first.begin(0.0)
+    assert comparison is not None
+    second.learned(found(comparison, FIRST))
+    assert second.orphans == []
+    second.peer_gone(FIRST, "x")
+    assert second.orphans == [found(comparison, SECOND)]

@@ -14,6 +14,7 @@ from mapweave_agent.past_runs import (
     numbered_from,
     young_enough,
 )
+from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 
 
 def a_map(*components: int, boot: str = "x", version: int = 1) -> RobotMap:
@@ -75,3 +76,19 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(FileError, match="file/state"):
         StateFolder(tmp_path / "file" / "state")
+
+
+def test_what_a_run_found_is_kept_beside_its_map(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = StateFolder(tmp_path)
+    folder.keep(a_map(0))
+    ends = [MapVersion(robot=robot, boot="x", version=1) for robot in ("a", "b")]
+    message = AlignmentMessage.pack("a", ends[0], ends[1], [])
+    folder.keep_found("x", [message])
+    [run] = folder.runs("a", now=0.0)
+    assert run.found == (message,)
+    (tmp_path / "x.found").write_bytes(b"cut")
+    [run] = folder.runs("a", now=0.0)
+    assert run.found == ()
+    assert "x.found: passed over" in caplog.text

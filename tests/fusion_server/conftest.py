@@ -115,10 +115,10 @@ def make_alignments() -> MakeAlignments:
 class ServerProcess:
     """A running ``mapweave server``; what it logs goes to a file."""
 
-    def __init__(self, endpoint: str, team: str, store: Path, interval: float) -> None:
+    def __init__(self, endpoint: str, team: str, store: Path, interval: float, *words: str) -> None:
         self.store = store
         self._log = store.with_name(f"{secrets.token_hex(4)}.log")
-        arguments = ["--connect", endpoint, "--team", team, "--store", str(store)]
+        arguments = ["--connect", endpoint, "--team", team, "--store", str(store), *words]
         with self._log.open("w") as log:
             self._process = subprocess.Popen(
                 [MAPWEAVE, "server", *arguments, "--min-interval", str(interval)], stderr=log
@@ -272,9 +272,9 @@ def start_server(endpoint: str, team: str, tmp_path: Path) -> Iterator[StartServ
     """Return what starts a server of the team on its store, and waits until it serves."""
     with ExitStack() as stack:
 
-        def start(*, interval: float = 0.0, store: Path | None = None) -> ServerProcess:
+        def start(*words: str, interval: float = 0.0, store: Path | None = None) -> ServerProcess:
             file = store or tmp_path / "store.sqlite"
-            server = ServerProcess(endpoint, team, file, interval)
+            server = ServerProcess(endpoint, team, file, interval, *words)
             stack.callback(server.stop, signal.SIGKILL)
             server.wait_for_log(f"coordinating team {team}")
             return server

@@ -191,15 +191,27 @@ def test_each_run_of_a_robot_keeps_its_map(make_map: MakeMap) -> None:
     assert _make_version(coordinator).maps == (first, second)
 
 
-def test_a_run_that_claims_the_components_of_another_one_takes_nothing_from_it(
-    make_map: MakeMap,
+def test_runs_that_claim_the_same_components_are_both_there_named_by_their_boots(
+    make_map: MakeMap, make_alignments: MakeAlignments
 ) -> None:
     coordinator = _coordinator()
-    first, second = make_map("a", 9, boot="first"), make_map("a", 1, boot="second")
-    assert coordinator.receive_map(first)
-    assert coordinator.clashes(second)
-    assert not coordinator.receive_map(second)
-    assert coordinator.receive_map(make_map("a", 10, boot="first"))
+    first, second, b = make_map("a", 9, boot="first"), make_map("a", boot="second"), make_map("b")
+    for robot_map in (first, b):
+        coordinator.receive_map(robot_map)
+    coordinator.receive_alignments(make_alignments(first, b))
+    assert not coordinator.clashes(first)
+    assert [m.robot for m in _make_version(coordinator).maps] == ["a", "b"]
+    assert coordinator.receive_map(second)
+    coordinator.receive_alignments(make_alignments(second, b, "refused"))
+    coordinator.receive_alignments(make_alignments(first, second))
+    assert coordinator.clashes(first) and coordinator.clashes(second)
+    version = _make_version(coordinator)
+    assert [m.robot for m in version.maps] == ["a@first", "a@second", "b"]
+    assert [(al.reference, al.other) for al in version.alignments] == [
+        ("a@first/0", "b/0"),
+        ("a@second/0", "b/0"),
+        ("a@first/0", "a@second/0"),
+    ]
 
 
 def test_of_one_robot_there_are_no_more_runs_than_so_many(make_map: MakeMap) -> None:

@@ -7,11 +7,10 @@ import pytest
 
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
-from mapweave_fusion_server.intake import Intake
+from mapweave_fusion_server.intake import ASKED_AFTER, Intake
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Arrival
-from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.coding import entropy
@@ -78,5 +77,5 @@ def test_a_robot_whose_map_has_not_come_is_asked_for_it(
         intake.take(status, 0.0)
         assert intake.robots_to_ask(0.0) == ([], [])  # it may be on its way
         intake.take(status, 0.0)
-        assert intake.robots_to_ask(GRACE) == (asked, [])
-        assert intake.robots_to_ask(10 * GRACE) == ([], [])  # nothing was heard since
+        assert intake.robots_to_ask(ASKED_AFTER) == (asked, [])
+        assert intake.robots_to_ask(10 * ASKED_AFTER) == ([], [])  # nothing was heard since

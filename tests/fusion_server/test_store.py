@@ -151,3 +151,47 @@ def test_a_store_belongs_to_one_team(path: Path) -> None:
 def test_a_store_has_one_server(path: Path) -> None:
     with Store(path, "rescue"), pytest.raises(FileError, match="in use"):
         Store(path, "rescue")
+
+
+def test_who_says_since_which_version_gets_what_that_has_not(tmp_path: Path) -> None:
+    with Store(tmp_path / "store.sqlite", "t") as store:
+        store.keep_map(("a", "x"), 0, 0.0, b"a")
+        store.add_alignments(("a@x", "b@x"), 0.0, b"ab")
+        store.add_version(1, 0.0, b"1")
+        store.keep_map(("b", "x"), 0, 0.0, b"b")
+        store.add_alignments(("a@x", "c@x"), 0.0, b"ac")
+        store.renew_alignments(("b@x", "a@x"), b"AB")  # says the same: no news
+        assert store.maps_since(None) == store.maps_since(0) == [b"a", b"b"]
+        assert store.maps_since(1) == [b"b"]
+        assert store.alignments_since(None) == [b"AB", b"ac"]
+        assert store.alignments_since(1) == [b"ac"]
+        assert store.map_of("a", "x") == b"a"
+        assert store.map_of("a", "y") is None
+
+
+def test_marks_and_orders_are_remembered_and_are_news(tmp_path: Path) -> None:
+    with Store(tmp_path / "store.sqlite", "rescue") as store:
+        store.add_version(1, 1.0, b"version")
+        assert not store.holds_news
+        store.keep_marks(("a", "x"), 2.0, b"first")
+        store.keep_marks(("a", "x"), 3.0, b"second")
+        store.keep_marks(("a", "y"), 3.0, b"of y")
+        assert store.holds_news
+        store.add_version(2, 4.0, b"version")
+        store.add_order("o2", 5.0, b"two")
+        store.add_order("o1", 5.0, b"one")
+        assert store.holds_news
+    with Store(tmp_path / "store.sqlite", "rescue") as store:
+        assert store.last_marks() == [b"second", b"of y"]
+        assert store.orders() == [b"two", b"one"]
+        assert store.holds_news
+
+
+def test_a_run_is_found_by_any_of_its_components(tmp_path: Path) -> None:
+    with Store(tmp_path / "store.sqlite", "rescue") as store:
+        store.keep_map(("a", "y"), 4, 1.0, b"later")
+        store.keep_map(("a", "x"), 1, 1.0, b"earlier")
+        store.keep_map(("b", "z"), 0, 1.0, b"another")
+        found = [store.map_with_component("a", number) for number in range(6)]
+        assert found == [b"earlier"] * 2 + [b"later"] * 3 + [None]
+        assert store.runs() == [("a", "x", 1), ("a", "y", 4), ("b", "z", 0)]

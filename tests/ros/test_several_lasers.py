@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
-from mapweave_ros.mounting import Mounting
 from mapweave_ros.several_lasers import SeveralLasers
 
 ANGLES = np.radians(np.arange(-90.0, 91.0))

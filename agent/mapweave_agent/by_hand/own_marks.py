@@ -1,7 +1,7 @@
 """The marks that a run of a robot makes; usable from several threads."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -27,14 +27,16 @@ class OwnMarks:
     ----------
     robot, boot
         Of the run.
+    before
+        Marks of the stored map that the run began with.
     """
 
-    def __init__(self, robot: str, boot: str) -> None:
+    def __init__(self, robot: str, boot: str, before: Iterable[Mark] = ()) -> None:
         self._robot = robot
         self._boot = boot
         self._lock = threading.Lock()
-        self._marks: dict[str, Mark] = {}
-        self._version = 0
+        self._marks = {mark.id: mark for mark in before}
+        self._version = 1 if self._marks else 0
         self._published = 0
 
     def add(

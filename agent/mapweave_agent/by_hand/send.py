@@ -69,12 +69,11 @@ def numbered(own: RobotMap, runs: list[WireRun]) -> RobotMap:
     One that was delivered before keeps the numbers that it has.
     """
     of_robot = [run for run in runs if run.robot == own.robot]
-    least = min(own.components)
     held = next((run for run in of_robot if run.boot == own.boot), None)
-    if held is not None and held.components:
-        return numbered_from(own, min(held.components) - least)
-    first = max((c + 1 for run in of_robot for c in run.components), default=0)
-    return numbered_from(own, max(first - least, 0))
+    if held is not None:
+        return numbered_from(own, held.last - max(own.components))
+    first = max((run.last + 1 for run in of_robot), default=0)
+    return numbered_from(own, max(first - min(own.components), 0))
 
 
 def _boot(path: Path, robot_map: RobotMap) -> str:
@@ -88,10 +87,7 @@ def _compared(
     session: zenoh.Session, team: str, own: RobotMap, run: WireRun, parameters: FusionParameters
 ) -> AlignmentMessage | None:
     """Return how the map lies to that of another run; None where that is not there any more."""
-    if not run.components:
-        return None
-    name = component_name(run.robot, max(run.components))
-    message = ask_map_of_component(session, team, name)
+    message = ask_map_of_component(session, team, component_name(run.robot, run.last))
     other = None if message is None else MapAssembler().update(message)
     if other is None:
         return None
@@ -111,4 +107,6 @@ def _named(own: RobotMap) -> str:
     return ", ".join(component_name(own.robot, component) for component in own.components)
 
 
-command = Command("Deliver a finished map to a team, as a robot's run.", _configure, _run)
+command = Command(
+    "Deliver a finished map to a team, as a robot's run.", _configure, _run, "r1.json --team rescue"
+)

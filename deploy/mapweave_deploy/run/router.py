@@ -32,13 +32,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="ENDPOINT",
         help=f"where to listen, such as tcp/0.0.0.0:7447; repeatable (default {DEFAULT_LISTEN})",
     )
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="where another router of the team is, tried until it answers; repeatable",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Route until interrupted or terminated."""
     endpoints: list[str] = options.listen or [DEFAULT_LISTEN]
     stopping = stop_on_signal()
-    with _open(endpoints):
+    with _open(endpoints, options.connect):
         print(f"router: listening at {', '.join(endpoints)}", file=sys.stderr)  # noqa: T201
         while not stopping():
             # In short naps: a signal that another thread takes does not wake this one.
@@ -46,9 +53,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _open(endpoints: list[str]) -> zenoh.Session:
+def _open(endpoints: list[str], others: list[str]) -> zenoh.Session:
     try:
-        return zenoh.open(router_config(endpoints))
+        return zenoh.open(router_config(endpoints, others))
     except zenoh.ZError as error:
         raise ListenError(endpoints, cause_of(str(error))) from error
 
@@ -59,4 +66,9 @@ def cause_of(text: str) -> str:
     return said[1].strip() if said else text.partition("\n")[0]
 
 
-command = Command("Run the process through which all the others reach each other.", configure, run)
+command = Command(
+    "Run the process through which all the others reach each other.",
+    configure,
+    run,
+    "--listen tcp/0.0.0.0:7447",
+)

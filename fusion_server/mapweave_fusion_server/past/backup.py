@@ -21,4 +21,6 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("Copy a store, also while the server uses it.", _configure, _run)
+command = Command(
+    "Copy a store, also while the server uses it.", _configure, _run, "copy.sqlite --team rescue"
+)

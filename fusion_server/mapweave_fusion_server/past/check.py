@@ -43,4 +43,4 @@ def _unreadable(view: StoreView) -> Iterator[str]:
                 yield f"row {row} of {table}: {error}"
 
 
-command = Command("Check whether a store is whole.", _configure, _run)
+command = Command("Check whether a store is whole.", _configure, _run, "--team rescue")

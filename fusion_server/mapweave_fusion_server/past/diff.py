@@ -71,4 +71,6 @@ def _wall(joint: JointMap) -> float:
     return sum(float(lengths(component.map.segments).sum()) for component in joint.components)
 
 
-command = Command("Tell what became different between two versions.", _configure, _run)
+command = Command(
+    "Tell what became different between two versions.", _configure, _run, "1 latest --team rescue"
+)

@@ -55,4 +55,6 @@ def _told(view: StoreView, number: int) -> tuple[str, list[list[str]]]:
     return tell_components(joint), [sorted(component.robots) for component in joint.components]
 
 
-command = Command("List the versions that a store has.", _configure, _run)
+command = Command(
+    "List the versions that a store has.", _configure, _run, "--team rescue --limit 10"
+)

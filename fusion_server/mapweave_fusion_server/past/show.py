@@ -37,4 +37,9 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("Show one version of a store, or write it as JOINT.json.", _configure, _run)
+command = Command(
+    "Show one version of a store, or write it as JOINT.json.",
+    _configure,
+    _run,
+    "latest --team rescue --output joint.json",
+)

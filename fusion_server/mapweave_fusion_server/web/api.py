@@ -11,6 +11,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
 from mapweave.errors import InvalidComponentError
+from mapweave.io.annotations import placed_mark_content
 from mapweave.io.map_files import alignment_content
 from mapweave.maps import parse_component
 from mapweave_fusion_server.web.downloads import (
@@ -53,6 +54,7 @@ class Api:
             Route("/api/poses", self._poses),
             Route("/api/parts/{robot}/{component:int}", self._part),
             Route("/api/alignments", self._alignments),
+            Route("/api/marks", self._marks),
             Route("/api/story", self._story),
             Route("/events", self._events),
         ]
@@ -160,6 +162,20 @@ class Api:
             return to_json({"version": 0, "alignments": []})
         alignments = [alignment_content(alignment) for alignment in joint.alignments]
         return to_json({"version": joint.version, "alignments": alignments})
+
+    async def _marks(self, _request: Request) -> Response:
+        return _json(await run_in_threadpool(self._marks_json))
+
+    def _marks_json(self) -> bytes:
+        """Return the marks of the latest version, each with the component whose frame it is in."""
+        joint = self._known.history.joint(self._known.history.latest)
+        components = () if joint is None else joint.components
+        marks = [
+            {**placed_mark_content(mark), "frame": min(each.robots, key=parse_component)}
+            for each in components
+            for mark in each.marks
+        ]
+        return to_json({"version": 0 if joint is None else joint.version, "marks": marks})
 
     async def _story(self, request: Request) -> Response:
         lines = self._known.story.since(_count(request, "since", 0) or 0)

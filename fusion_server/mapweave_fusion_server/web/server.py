@@ -27,6 +27,7 @@ from mapweave_fusion_server.web.feed import Feed, Seen
 from mapweave_fusion_server.web.guard import Guard
 from mapweave_fusion_server.web.history import History
 from mapweave_fusion_server.web.knowledge import Knowledge
+from mapweave_fusion_server.web.orders import PageOrders
 from mapweave_fusion_server.web.story import StoryTail
 
 STATIC = Path(__file__).with_name("static")
@@ -101,6 +102,7 @@ def application(address: HttpAddress, knowledge: Knowledge, bell: Bell, token: s
         Route("/api", _page("api.html")),
         Route("/api/openapi.json", _page("openapi.json")),
         *Api(knowledge, bell).routes,
+        *PageOrders(knowledge).routes,
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
     handlers = {HTTPException: _tell}

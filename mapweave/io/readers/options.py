@@ -1,5 +1,6 @@
 """How a file of scans is to be read."""
 
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +20,9 @@ class ReadOptions:
         Of a bag: the laser's topic, such as ``/scan``; None takes the only one there is.
     on_warning
         Called once, after the last scan, if something was left out; of a live source, when it is.
+    odometry_topic
+        Of a bag or a ROS 2 network: where odometry is said, such as ``/odom`` or ``/tf``; None
+        takes the only one of a bag, where `odometry` asks for it.
     network
         Endpoints of the network that the reader is on, for sources that are on it as well.
     """
@@ -28,3 +32,39 @@ class ReadOptions:
     topic: str | None = None
     on_warning: Callable[[str], None] = warnings.warn
     network: tuple[str, ...] | None = None
+    odometry_topic: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryChoice:
+    """Which odometry may help; none unless it is asked for.
+
+    Attributes
+    ----------
+    prior
+        Whether any may.
+    topic
+        Where it is said; None for what stands beside the scans.
+    live
+        Whether the topic is one of a ROS 2 network.
+    """
+
+    prior: bool = False
+    topic: str | None = None
+    live: bool = False
+
+    @classmethod
+    def parse(cls, text: str) -> "OdometryChoice":
+        """Return what ``none``, ``prior``, ``/odom`` or ``ros2:/odom`` says.
+
+        Raises
+        ------
+        ValueError
+            If it says nothing like it.
+        """
+        if text in ("none", "prior"):
+            return cls(text == "prior")
+        topic = text.removeprefix("ros2:")
+        if not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", topic):
+            raise ValueError(f"{text!r}: expected none, prior, or a topic such as /odom")
+        return cls(True, topic, topic != text)

@@ -101,6 +101,7 @@ def _scan(index: int, content: dict[str, Any], *, odometry: bool) -> Scan:
         index=index,
         stamp=stamp if math.isfinite(stamp) else math.nan,
         odometry=content.get("odometry") if odometry else None,
+        time_increment=_number(content, "time_increment", 0.0),
     )
 
 

@@ -36,7 +36,7 @@ TEXT_FORMATS: tuple[ScanFormat, ...] = (scan_lines,)
 def read_scans(
     path: str | Path,
     *,
-    odometry: bool = False,
+    odometry: bool | str = False,
     angular_step: float | None = None,
     topic: str | None = None,
     on_warning: Callable[[str], None] = warnings.warn,
@@ -58,7 +58,8 @@ def read_scans(
         name.
     odometry
         Fill `Scan.odometry` with the robot pose that the line states, where it is finite. (A log
-        that another program has corrected states the corrected pose there, too.)
+        that another program has corrected states the corrected pose there, too.) Of a bag the
+        topic, such as ``/odom`` or ``/tf``, or True for the only one.
     angular_step
         Between beams [rad], where a line does not state it (``FLASER``); None has the log's
         parameters tell, or the number of beams.
@@ -77,7 +78,8 @@ def read_scans(
         If it is a bag, and `rosbags` is not installed.
     """
     source = Path(path)
-    options = ReadOptions(odometry, angular_step, topic, on_warning)
+    which = odometry if isinstance(odometry, str) else None
+    options = ReadOptions(bool(odometry), angular_step, topic, on_warning, odometry_topic=which)
     if source.is_dir():
         return bag_folder.read(source, options)
     log.check_is_file(source)

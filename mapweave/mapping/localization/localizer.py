@@ -185,7 +185,14 @@ class Localizer:
             located = [each.step for each in steps]
             for k in range(0, len(located), length):
                 submaps.append(_path(len(submaps), component, located[k : k + length]))
-        return RobotMap(self.robot, self.boot, len(self._path), tuple(submaps), self._made_with)
+        return RobotMap(
+            self.robot,
+            self.boot,
+            len(self._path),
+            tuple(submaps),
+            self._made_with,
+            self._known.marks,
+        )
 
     def snapshot(self) -> "LocalizedMap":
         """Return what `robot_map` would return now: it is drawn in a moment."""

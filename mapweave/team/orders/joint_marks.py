@@ -37,12 +37,17 @@ class HeldMark:
 
 
 def held_marks(maps: Iterable[RobotMap]) -> HeldMarks:
-    """Return the marks of `maps`; those whose scan is in no submap yet are left out."""
+    """Return the marks of `maps`, each once; those whose scan is in no submap yet are left out.
+
+    The same mark is on several maps where one run went on from the map of another.
+    """
     held: dict[str, list[HeldMark]] = {}
+    known: set[str] = set()
     for robot_map in maps:
         for mark in robot_map.marks:
             found = find(robot_map.submaps, mark.anchor)
-            if found is not None:
+            if found is not None and mark.id not in known:
+                known.add(mark.id)
                 name = component_name(robot_map.robot, found[0].component)
                 held.setdefault(name, []).append(HeldMark(mark, robot_map.robot, *found))
     return held

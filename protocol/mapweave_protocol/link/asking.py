@@ -1,17 +1,20 @@
 """Questions to the coordinator, answered from its store."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import zenoh
 
 from mapweave.maps import parse_component
 from mapweave_protocol.errors import MessageError
+from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY
+from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY, MAP
 from mapweave_protocol.wire.messages import (
     JointMapMessage,
     MapMessage,
+    MapVersion,
     OrderMessage,
     OrdersMessage,
     RunsMessage,
@@ -24,6 +27,7 @@ ANSWER_WITHIN = 5.0  # [s]
 ALL_ORDERS = JointQuery(orders="all").parameters
 
 M = TypeVar("M", bound=Message)
+_log = logging.getLogger(__name__)
 
 
 def ask_joint_maps(
@@ -170,11 +174,58 @@ def _request(
     )
 
 
+def request_map(
+    session: zenoh.Session, team: str, state: MapVersion, take: Callable[[Arrival], None]
+) -> None:
+    """Ask the coordinator for the map of a run; it comes as if its robot had published it.
+
+    Parameters
+    ----------
+    take
+        Called in a thread of Zenoh's.
+    """
+    key = MAP.build(team=team, robot=state.robot)
+    query = JointQuery(robot=state.robot, boot=state.boot)
+
+    def take_reply(reply: zenoh.Reply) -> None:
+        if reply.ok:
+            take(Arrival(key, reply.ok.payload.to_bytes()))
+
+    session.get(
+        f"{JOINT_QUERY.build(team=team)}?{query.parameters}",
+        take_reply,
+        consolidation=zenoh.ConsolidationMode.NONE,
+        timeout=ANSWER_WITHIN,
+    )
+
+
+def ask_for_what_is_valid(
+    session: zenoh.Session, team: str, query: JointQuery, kind: type[M]
+) -> list[M]:
+    """Return the valid answers to `query`; of the others the first is told."""
+    answers: list[M] = []
+    warned = False
+    for payload in _payloads(session, team, query, ANSWER_WITHIN):
+        try:
+            answers.append(decode(kind, payload))
+        except MessageError as error:
+            if not warned:
+                _log.warning("answer ignored, %s", error)
+            warned = True
+    return answers
+
+
 def _ask(
     session: zenoh.Session, team: str, query: JointQuery, kind: type[M], timeout: float
 ) -> list[M]:
+    return [decode(kind, payload) for payload in _payloads(session, team, query, timeout)]
+
+
+def _payloads(
+    session: zenoh.Session, team: str, query: JointQuery, timeout: float
+) -> Iterator[bytes]:
     parameters = query.parameters
     selector = JOINT_QUERY.build(team=team) + (f"?{parameters}" if parameters else "")
     # The default keeps one reply a key; the answers to `since` all have the same.
     replies = session.get(selector, consolidation=zenoh.ConsolidationMode.NONE, timeout=timeout)
-    return [decode(kind, reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
+    return (reply.ok.payload.to_bytes() for reply in replies if reply.ok)

@@ -76,7 +76,10 @@ class Inbox:
     def put(self, sample: zenoh.Sample) -> None:
         """Take in `sample`; made to be a subscriber's callback."""
         gone = sample.kind == zenoh.SampleKind.DELETE
-        arrival = Arrival(str(sample.key_expr), sample.payload.to_bytes(), gone)
+        self.add(Arrival(str(sample.key_expr), sample.payload.to_bytes(), gone))
+
+    def add(self, arrival: Arrival) -> None:
+        """Take in `arrival`, in any thread."""
         with self._changed:
             self._arrivals.append(arrival)
             self._changed.notify()

@@ -6,7 +6,7 @@ must not be flooded, so it is done ever more rarely.
 
 from dataclasses import dataclass
 
-GRACE = 2.0  # [s] without progress before the first time: a reconnection takes one
+GRACE = 0.75  # [s] without progress before the first time: less than statuses are apart
 LONGEST = 60.0  # [s] between two times
 MAX_WATCHED = 4096  # names come from the network
 
@@ -21,9 +21,16 @@ class _Lack:
 
 
 class Lacking:
-    """Watches what others hold against what they should hold."""
+    """Watches what others hold against what they should hold.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    grace
+        [s] without progress before the first time.
+    """
+
+    def __init__(self, grace: float = GRACE) -> None:
+        self._grace = grace
         self._lacks: dict[str, _Lack] = {}
 
     def due(self, who: str, holds: object, now: float, *, lacks: bool) -> bool:
@@ -45,7 +52,7 @@ class Lacking:
             return False
         lack = self._lacks.get(who)
         if lack is None or lack.holds != holds:
-            self._watch(who, _Lack(holds, now + GRACE, GRACE))
+            self._watch(who, _Lack(holds, now + self._grace, self._grace))
             return False
         if now < lack.due:
             return False

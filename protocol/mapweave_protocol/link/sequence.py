@@ -26,15 +26,19 @@ class JointSequence:
     whole_up_to
         If the first version that arrives is higher, it is the first to deliver, and the earlier
         ones are history; otherwise version 1 is.
+    since
+        Deliver all versions after this one instead; of a series that has not come so far, all.
     """
 
-    def __init__(self, *, whole_up_to: int) -> None:
+    def __init__(self, *, whole_up_to: int, since: int | None = None) -> None:
         self._whole_up_to = whole_up_to
-        self._last: int | None = None
+        self._since = since  # until something is delivered
+        self._last: int | None = since
         self._newest = 0
         self._series: str | None = None
         self._waiting: dict[int, JointMapMessage] = {}
         self._tries = 0
+        self._has_answer = False
         self._strangers = _Strangers()
 
     @property
@@ -44,7 +48,8 @@ class JointSequence:
             return JointQuery()
         if self._newest <= (self._last or 0):
             return None
-        if self._last is None or self._tries == MAX_TRIES - 1:
+        unknown = self._last is None or self._series is None
+        if unknown or self._tries == MAX_TRIES - 1:
             return JointQuery()  # is there such a version at all?
         return JointQuery(since=self._last, limit=ASKED_AT_ONCE)
 
@@ -68,6 +73,7 @@ class JointSequence:
         self, query: JointQuery, messages: Sequence[JointMapMessage], now: float = 0.0
     ) -> None:
         """Take in the answers to `query`; `now` as of `offer`."""
+        self._has_answer |= any(message.series == self._series for message in messages)
         if query == JointQuery():
             self._strangers.answered(now)
             self._follow({message.series for message in messages})
@@ -85,6 +91,8 @@ class JointSequence:
         if self._series in (None, series):
             self._strangers.own_spoke()
             self._newest = max(self._newest, version)
+            if self._since is not None and version < self._since:
+                self._last = 0
         else:
             self._strangers.spoke(now)
 
@@ -93,13 +101,14 @@ class JointSequence:
         following = self._waiting.pop((self._last or 0) + 1, None)
         if following is None:
             return None
-        self._last, self._tries = following.version, 0
+        self._last, self._tries, self._since = following.version, 0, None
         return following.unpack()
 
     def give_up(self) -> int:
         """Count a try to close the gap that did not help; skip the gap after several.
 
-        Where nobody has answered, what is far ahead is forgotten instead: it may be of nobody.
+        Where nobody has answered, what is far ahead is forgotten instead: it may be of nobody. What
+        is near may be there still when the coordinator is back.
 
         Returns
         -------
@@ -111,8 +120,10 @@ class JointSequence:
             return 0
         self._tries, last = 0, self._last or 0
         self._believe(min(self._newest, max(last, self._whole_up_to) + MAX_WAITING))
+        answered, self._has_answer = self._has_answer, False
         if not self._waiting:
             self._newest = last
+        if not self._waiting or not answered:
             return 0
         self._last = min(self._waiting) - 1
         return self._last - last

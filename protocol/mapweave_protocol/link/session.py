@@ -24,6 +24,8 @@ DEFAULT_ENDPOINT = "tcp/localhost:7447"
 ENDPOINT_VARIABLE = "MAPWEAVE_CONNECT"
 ATTEMPT = 1.0  # [s] one attempt to connect; between attempts, Ctrl-C is heard
 PAUSE = 0.2  # [s] between attempts
+# Also after a long outage the link is back soon after the router can be reached.
+RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2}
 LEASE = 5.0  # [s] after which a robot that fell silent counts as gone
 HEARTBEAT = 0.5  # [s] after which the loss of a publisher's last sample is noticed
 
@@ -54,12 +56,18 @@ def session_config(endpoints: Sequence[str], mode: Mode = "client") -> zenoh.Con
         "connect/endpoints": list(endpoints),
         "connect/timeout_ms": int(ATTEMPT * 1000),
         "connect/exit_on_failure": True,
+        "connect/retry": RETRY,
     }
     return _config(settings, endpoints)
 
 
-def router_config(listen: Sequence[str]) -> zenoh.Config:
+def router_config(listen: Sequence[str], connect: Sequence[str] = ()) -> zenoh.Config:
     """Return the configuration of a router that listens at the endpoints `listen`.
+
+    Parameters
+    ----------
+    connect
+        Where other routers listen: who is at any of them reaches who is at another.
 
     Raises
     ------
@@ -70,12 +78,16 @@ def router_config(listen: Sequence[str]) -> zenoh.Config:
         "mode": "router",
         "listen/endpoints": list(listen),
         "listen/exit_on_failure": True,
+        "connect/endpoints": list(connect),
+        "connect/timeout_ms": -1,  # tried for ever, beside what it does
+        "connect/exit_on_failure": False,
+        "connect/retry": RETRY,
         "scouting/delay": 0,
         # With the defaults, 100 idle connections keep newcomers out for 11 s.
         "transport/unicast/accept_timeout": 1000,
         "transport/unicast/accept_pending": 500,
     }
-    return _config(settings, listen)
+    return _config(settings, [*listen, *connect])
 
 
 def _common_settings() -> dict[str, object]:

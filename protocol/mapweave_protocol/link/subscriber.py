@@ -7,30 +7,38 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from itertools import takewhile
 from typing import TypeVar
 
 import zenoh
 
+from mapweave.errors import ArgumentError
 from mapweave.geometry.arguments import as_positive
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.asking import ask_joint_maps, ask_latest
-from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
+from mapweave_protocol.link.asking import ask_for_what_is_valid, ask_latest
+from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import (
     Arrival,
     Inbox,
     Reader,
-    alignment_reader,
     joint_reader,
     joint_status_reader,
-    map_reader,
     pose_reader,
     status_reader,
 )
+from mapweave_protocol.link.replication import replicated_alignments, replicated_maps
 from mapweave_protocol.link.sequence import SHORT_HISTORY, JointSequence
 from mapweave_protocol.link.session import declare_subscriber, open_session
-from mapweave_protocol.wire.keys import ALIGNMENT, JOINT_MAP, JOINT_STATUS, MAP, POSE, STATUS
+from mapweave_protocol.wire.keys import (
+    ALIGNMENT,
+    JOINT_MAP,
+    JOINT_STATUS,
+    MAP,
+    POSE,
+    STATUS,
+)
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
@@ -52,12 +60,15 @@ def joint_maps(
     *,
     connect: Sequence[str] | None = None,
     timeout: float | None = None,
+    since: int | None = None,
     stopping: Callable[[], bool] = lambda: False,
 ) -> Iterator[JointMap]:
     """Yield the team's joint maps in the order of their versions, without a gap.
 
     The first is the latest there is; who began to listen before there was any gets 1, 2, 3… Who
     began before there was a coordinator gets the latest of its history, or all of a short one.
+    Outages and restarts leave no gap. A coordinator with another store counts from 1 again; where
+    there are two, one is followed as long as it answers.
 
     Parameters
     ----------
@@ -67,6 +78,8 @@ def joint_maps(
         Endpoints of the router, or one; by default ``MAPWEAVE_CONNECT`` or this machine.
     timeout
         End after this time without a new one [s], above 0; None never ends.
+    since
+        Begin with the version after this one, 0 or more, instead of the latest.
     stopping
         Asked now and then: where it says so, end.
 
@@ -77,19 +90,20 @@ def joint_maps(
     EndpointError
         If an endpoint is not one.
     ArgumentError
-        If `timeout` is not above 0.
+        If `timeout` is not above 0, or `since` is below 0.
     UnreachableError
         If no router answers within `timeout`.
     """
+    _check_since(since)
     said = Inbox()
     with (
         _listening(JOINT_MAP.pattern(team=team), connect, timeout, 1) as (session, inbox),
         session.declare_subscriber(JOINT_STATUS.build(team=team), said.put),
     ):
-        sequence = _begin(session, team)
+        sequence = _begin(session, team, since)
 
         def ask(query: JointQuery) -> list[JointMapMessage]:
-            return _ask(session, team, query)
+            return ask_for_what_is_valid(session, team, query, JointMapMessage)
 
         def expect() -> None:
             _expect(sequence, said)
@@ -99,24 +113,34 @@ def joint_maps(
 
 
 def robot_maps(
-    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    since: int | None = None,
 ) -> Iterator[RobotMap]:
-    """Yield the robots' maps as they grow; parameters and errors as for `joint_maps`."""
-    assembler = MapAssembler()
-    key = MAP.pattern(team=team)
-    with _listening(key, connect, timeout, MESSAGES_TO_COMPLETE) as (_, inbox):
-        for message in _read(map_reader(), inbox.get, timeout):
-            robot_map = assembler.update(message) if message else None
-            if robot_map is not None:
-                yield robot_map
+    """Yield the robots' maps: the latest of each run at once, then each as it grows.
+
+    Also those of robots that are gone, as far as there is a coordinator; what was missed in an
+    outage comes after it. Parameters and errors as for `joint_maps`, but: `since` is a version of
+    the joint map, and leaves out what the coordinator had before that was begun.
+    """
+    _check_since(since)
+    with _listening(MAP.pattern(team=team), connect, timeout, MESSAGES_TO_COMPLETE) as opened:
+        yield from replicated_maps(*opened, team, since, partial(_read, timeout=timeout))
 
 
 def alignments(
-    team: str, *, connect: Sequence[str] | None = None, timeout: float | None = None
+    team: str,
+    *,
+    connect: Sequence[str] | None = None,
+    timeout: float | None = None,
+    since: int | None = None,
 ) -> Iterator[AlignmentMessage]:
-    """Yield what the robots find out about pairs of maps; as for `joint_maps`."""
-    with _listening(ALIGNMENT.pattern(team=team), connect, timeout, 1) as (_, inbox):
-        yield from filter(None, _read(alignment_reader(), inbox.get, timeout))
+    """Yield what the robots find out about pairs of maps; as for `robot_maps`."""
+    _check_since(since)
+    with _listening(ALIGNMENT.pattern(team=team), connect, timeout, 1) as opened:
+        yield from replicated_alignments(*opened, team, since, partial(_read, timeout=timeout))
 
 
 def statuses(
@@ -175,8 +199,15 @@ def _read(
         yield message
 
 
-def _begin(session: zenoh.Session, team: str) -> JointSequence:
-    """Return a sequence that holds the latest joint map there is."""
+def _check_since(since: int | None) -> None:
+    if since is not None and not (isinstance(since, int) and 0 <= since <= MAX_COUNT):
+        raise ArgumentError("since", f"expected a version of the joint map or 0, got {since!r}")
+
+
+def _begin(session: zenoh.Session, team: str, since: int | None) -> JointSequence:
+    """Return a sequence that holds the latest joint map there is, unless all `since` one do."""
+    if since is not None:
+        return JointSequence(whole_up_to=MAX_COUNT, since=since)
     try:
         latest, answered = ask_latest(session, team)
     except MessageError as error:
@@ -186,12 +217,12 @@ def _begin(session: zenoh.Session, team: str) -> JointSequence:
         # A coordinator that has none yet will count from 1; if there is none, its store may be old.
         return JointSequence(whole_up_to=MAX_COUNT if answered else SHORT_HISTORY)
     sequence = JointSequence(whole_up_to=0)
-    sequence.offer(latest)
+    sequence.offer(latest, time.monotonic())
     return sequence
 
 
 def _expect(sequence: JointSequence, said: Inbox) -> None:
-    """Have `sequence` expect the versions that the coordinator has said to have."""
+    """Have `sequence` expect the versions that a coordinator has said to have."""
     reader = joint_status_reader()
     while (arrival := said.get(0.0)) is not None:
         status = reader.read(arrival)
@@ -232,11 +263,3 @@ def _close_gap(
             return
         yield filled
         yield from iter(sequence.take, None)
-
-
-def _ask(session: zenoh.Session, team: str, query: JointQuery) -> list[JointMapMessage]:
-    try:
-        return ask_joint_maps(session, team, query)
-    except MessageError as error:
-        _log.warning("answer ignored, %s", error)
-        return []

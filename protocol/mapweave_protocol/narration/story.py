@@ -39,6 +39,12 @@ class RobotState:
         """Whether a run of it is alive."""
         return bool(self.claimants.boots)
 
+    def is_of_namesake(self, robot_map: RobotMap) -> bool:
+        """Tell whether a map is of another run than `map`, which is alive and not before it."""
+        if self.map is None or self.map.boot not in self.claimants.boots - {robot_map.boot}:
+            return False
+        return not is_earlier_run(self.map, robot_map)
+
     @property
     def progress(self) -> str:
         """How far it is, in a few words."""
@@ -108,7 +114,9 @@ class Story:
     def mapped(self, robot_map: RobotMap) -> Iterator[str]:
         """Tell that a robot lost its way or found it, and when its map is twice what was told."""
         state = self._robot(robot_map.robot)
-        if state.map is not None and is_earlier_run(robot_map, state.map):
+        if state.map is not None and (
+            is_earlier_run(robot_map, state.map) or state.is_of_namesake(robot_map)
+        ):
             return
         before, state.map = state.map, robot_map
         if before is not None and before.boot == robot_map.boot:

@@ -190,4 +190,9 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-command = Command("Show what a team does, as it happens.", _configure, _run)
+command = Command(
+    "Show what a team does, as it happens.",
+    _configure,
+    _run,
+    "--team rescue --connect tcp/192.168.1.10:7447",
+)

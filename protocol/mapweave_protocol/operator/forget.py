@@ -102,4 +102,9 @@ def _robot_and_boot(text: str) -> tuple[str, str | None]:
         raise ValueError(str(error)) from error
 
 
-command = Command("Take what a robot mapped out of the joint map.", _configure, _run)
+command = Command(
+    "Take what a robot mapped out of the joint map.",
+    _configure,
+    _run,
+    "r1 --reason 'its laser was loose' --team rescue",
+)

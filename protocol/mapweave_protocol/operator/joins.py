@@ -120,9 +120,11 @@ pin = Command(
     "Say that two components lie as found, or as given.",
     partial(_configure, kind=OrderKind.PIN),
     partial(_run, kind=OrderKind.PIN),
+    "r1/0 r2/0 --reason 'seen from the door' --team rescue",
 )
 forbid = Command(
     "Say that two components may not be joined.",
     partial(_configure, kind=OrderKind.FORBID),
     partial(_run, kind=OrderKind.FORBID),
+    "r1/0 r2/0 --reason 'two like floors' --team rescue",
 )

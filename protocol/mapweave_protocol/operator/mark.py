@@ -96,4 +96,9 @@ def _label(text: str) -> str:
     return text
 
 
-command = Command("Mark a place on a robot's map, such as a victim.", _configure, _run)
+command = Command(
+    "Mark a place on a robot's map, such as a victim.",
+    _configure,
+    _run,
+    "r1 victim --at 3.5,1.2 --team rescue",
+)

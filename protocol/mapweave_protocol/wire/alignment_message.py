@@ -168,7 +168,8 @@ class AlignmentMessage(Message):
     reference, other
         From which states of which maps.
     alignments
-        One for each pair of components, its `reference` of the robot `reference`.
+        One for each pair of components, its `reference` of the robot `reference`. Of two runs of
+        a robot, its `reference` is of the run `reference`.
     """
 
     letter: ClassVar[bytes] = b"a"
@@ -194,14 +195,32 @@ class AlignmentMessage(Message):
     @model_validator(mode="after")
     def _check(self) -> Self:
         for alignment in self.alignments:
-            robots = {parse_component(n)[0] for n in (alignment.reference, alignment.other)}
-            if not robots <= {self.reference.robot, self.other.robot}:
-                raise ValueError(f"{alignment.reference} and {alignment.other}: another pair")
+            self.ends_of(alignment)
         return self
+
+    def ends_of(self, alignment: Alignment | WireAlignment) -> tuple[MapVersion, MapVersion]:
+        """Return which of the two maps each component of one of the alignments is of.
+
+        Raises
+        ------
+        ValueError
+            If it is of another pair.
+        """
+        names = alignment.reference, alignment.other
+        for ours, theirs in ((self.reference, self.other), (self.other, self.reference)):
+            if all(map(_is_of, names, (ours, theirs))):
+                return ours, theirs
+        raise ValueError(f"{alignment.reference} and {alignment.other}: another pair")
 
     def unpack(self) -> tuple[Alignment, ...]:
         """Return the alignments."""
         return tuple(alignment.unpack() for alignment in self.alignments)
+
+
+def _is_of(component: str, run: MapVersion) -> bool:
+    """Tell whether a component, by its name, may be one of a run."""
+    robot, _, boot = parse_component(component)[0].partition("@")
+    return robot == run.robot and boot in ("", run.boot)
 
 
 def _short(number: float) -> float:

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.ids import ID_PATTERN
+from mapweave.ids import ID_PATTERN, RUN_PATTERN
 
 WORLD_REACH = 1e5  # [m] from a component's origin
 JOINT_REACH = 1e9  # [m]; alignments within WORLD_REACH add up along a chain of components
@@ -28,7 +28,7 @@ def _check_printable(text: str) -> str:
 
 Label = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_check_printable)]
 Sentence = Annotated[str, Field(max_length=500), AfterValidator(_check_printable)]
-ComponentName = Annotated[str, Field(pattern=ID_PATTERN[:-1] + "/(0|[1-9][0-9]{0,4})$")]
+ComponentName = Annotated[str, Field(pattern=RUN_PATTERN[:-1] + "/(0|[1-9][0-9]{0,4})$")]
 # A whole turn, as nobody promises that a sum of two angles was wrapped.
 Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=-WORLD_REACH, le=WORLD_REACH, allow_inf_nan=False)]

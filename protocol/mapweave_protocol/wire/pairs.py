@@ -1,7 +1,12 @@
-"""Pairs of robots and runs: who compares their maps, which of two comparisons or runs is older."""
+"""Pairs of robots and runs: who compares their maps, which of two comparisons or runs is older.
+
+A run is named like its robot. Where two runs of a robot have components of the same numbers, as
+those of two machines with one id, both are named by their boots as well: ``r1@BOOT/0``.
+"""
 
 import zlib
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TypeAlias
 
 from mapweave.maps import RobotMap
@@ -33,6 +38,33 @@ def is_older(one: Iterable[MapVersion], another: Iterable[MapVersion]) -> bool:
         return False
     steps = [now[run] - before[run] for run in now]
     return max(steps) <= 0 and min(steps) < 0
+
+
+def run_of(source: RobotMap | MapVersion) -> Run:
+    """Return which run a map, or a state of it, is of."""
+    return source.robot, source.boot
+
+
+def clash(one: RobotMap, another: RobotMap) -> bool:
+    """Tell whether two runs of a robot have components of the same numbers."""
+    if one.robot != another.robot or one.boot == another.boot:
+        return False
+    return not set(one.components).isdisjoint(another.components)
+
+
+def name_with_boot(run: Run) -> str:
+    """Return what a run is named where its robot's id does not tell it from another."""
+    return "@".join(run)
+
+
+def with_boots(robot_map: RobotMap) -> RobotMap:
+    """Return `robot_map`, its components named by the boot as well."""
+    return replace(robot_map, robot=name_with_boot(run_of(robot_map)))
+
+
+def told_apart(one: RobotMap, another: RobotMap) -> tuple[RobotMap, RobotMap]:
+    """Return two maps, their components named so that no two names are the same."""
+    return (with_boots(one), with_boots(another)) if clash(one, another) else (one, another)
 
 
 def is_earlier_run(one: RobotMap, another: RobotMap) -> bool:

@@ -2,8 +2,10 @@
 
 Replies, one sample each, on the same key: to none and ``version=N`` a `JointMapMessage`, to
 ``since=N`` one for every version after N in their order (the first K with ``limit=K``), to
-``robot=ID`` and ``component=ID/K`` a complete `MapMessage`, to ``runs=all`` a `RunsMessage`, to
-``orders=all`` an `OrdersMessage`, which agents give as well.
+``robot=ID`` and ``component=ID/K`` a complete `MapMessage` (of the robot's last run, or of that
+with ``boot=BOOT``), to ``of=maps`` those of all runs, to ``of=alignments`` an `AlignmentMessage` of
+each pair of runs, with ``since=N`` only what is not in version N; to ``runs=all`` a `RunsMessage`,
+to ``orders=all`` an `OrdersMessage`, which agents give as well.
 """
 
 import re
@@ -16,7 +18,11 @@ from mapweave_protocol.wire.model import ComponentName, Count, Id
 
 _NUMBER = re.compile(r"[0-9]{1,15}")
 _COUNTED = {"version", "since", "limit"}
-_EXPECTED = "version=N, since=N, since=N;limit=K, robot=ID, component=ID/K, runs=all, orders=all"
+_EXPECTED = (
+    "version=N, since=N, since=N;limit=K, robot=ID, robot=ID;boot=BOOT, component=ID/K, of=maps,"
+    " of=alignments, since=N;of=maps, since=N;of=alignments, runs=all, orders=all"
+)
+_BESIDE = {"limit": "since", "boot": "robot"}  # what refines another question
 
 
 class JointQuery(BaseModel):
@@ -32,6 +38,10 @@ class JointQuery(BaseModel):
         No more of them than so many, those that come first.
     robot
         The last map of this robot, gone or not.
+    boot
+        Of which run of it.
+    of
+        All of these instead of joint maps.
     component
         The map of the run that this component is, or was, of.
     runs
@@ -46,16 +56,20 @@ class JointQuery(BaseModel):
     since: Count | None = Field(default=None)
     limit: int | None = Field(default=None, ge=1, le=2**53)
     robot: Id | None = Field(default=None)
+    boot: Id | None = Field(default=None)
+    of: Literal["maps", "alignments"] | None = Field(default=None)
     component: ComponentName | None = Field(default=None)
     runs: Literal["all"] | None = Field(default=None)
     orders: Literal["all"] | None = Field(default=None)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if len(self._given().keys() - {"limit"}) > 1:
+        given = self._given().keys()
+        if len(given - _BESIDE.keys()) > 1 and given != {"since", "of"}:
             raise ValueError("expected one question")
-        if self.limit is not None and self.since is None:
-            raise ValueError("limit, expected beside since only")
+        for name, other in _BESIDE.items():
+            if name in given and other not in given:
+                raise ValueError(f"{name}, expected beside {other} only")
         return self
 
     @property

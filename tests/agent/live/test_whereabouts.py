@@ -7,11 +7,12 @@ import pytest
 
 from mapweave.geometry import se2
 from mapweave.mapping.placement import Placement
-from mapweave.maps import JointComponent, JointMap, LineMap
+from mapweave.maps import Alignment, Decision, JointComponent, JointMap, LineMap
+from mapweave.reasons import Reason
 from mapweave.scan.scan import Scan
 from mapweave_agent.live.whereabouts import Whereabouts, covariance_of
 from mapweave_protocol.wire.joint_status_message import frames_of
-from mapweave_protocol.wire.messages import JointStatusMessage
+from mapweave_protocol.wire.messages import AlignmentMessage, JointStatusMessage, MapVersion
 
 POSE = np.array([3.0, 1.0, 0.4])
 UNCERTAINTY = np.array([0.3, 0.02, 0.01, 0.0])  # along x
@@ -92,6 +93,68 @@ def test_a_component_that_the_joint_map_no_longer_has_is_in_no_joint_frame() -> 
     message = whereabouts.message(scan(0), placed(), 0.0)
     assert message is not None
     assert message.joint is None
+
+
+def meeting(decision: Decision = "accepted") -> AlignmentMessage:
+    """Return how r2/0 lies to r1/0, which r1 has found."""
+    first, second = (MapVersion(robot=robot, boot="b", version=1) for robot in ("r1", "r2"))
+    turned = np.array([10.0, 5.0, np.pi / 2])
+    found = Alignment("r1/0", "r2/0", turned, decision, 0.9, Reason.words("so"))
+    return AlignmentMessage.pack("r1", first, second, [found])
+
+
+def frame_of(whereabouts: Whereabouts) -> tuple[str, int, tuple[float, ...]] | None:
+    message = whereabouts.message(scan(0), placed(), 0.0)
+    assert message is not None
+    joint = message.joint
+    if joint is None:
+        return None
+    return joint.frame, joint.since, tuple(round(number, 9) for number in joint.pose)
+
+
+def test_without_a_coordinator_two_robots_that_met_are_in_the_frame_of_the_first_of_them() -> None:
+    first, second = Whereabouts("r1", "b", 0), Whereabouts("r2", "b", 0)
+    for each in (first, second):
+        each.met(meeting())
+    assert frame_of(first) == ("r1/0", 0, tuple(POSE))
+    where = frame_of(second)
+    assert where is not None
+    assert where[:2] == ("r1/0", 0)
+    np.testing.assert_allclose(where[2], [9.0, 8.0, 0.4 + np.pi / 2], atol=1e-5)
+    second.met(meeting("refused"))
+    assert frame_of(second) is None
+
+
+def test_who_met_in_another_run_is_nowhere_in_a_partners_frame() -> None:
+    whereabouts = Whereabouts("r2", "later", 0)
+    whereabouts.met(meeting())
+    assert frame_of(whereabouts) is None
+
+
+def test_what_a_coordinator_said_stands_when_it_left_but_that_a_robot_is_alone() -> None:
+    whereabouts = Whereabouts("r2", "b", 0)
+    whereabouts.met(meeting())
+    whereabouts.coordinator(joint(3, {"r2/0": [0.0, 0.0, 0.0]}))
+    assert frame_of(whereabouts) == ("r2/0", 3, tuple(POSE))
+    whereabouts.coordinator_here("c", here=False)
+    assert (frame_of(whereabouts) or ())[:2] == ("r1/0", 0)
+    whereabouts.coordinator_here("c", here=True)
+    whereabouts.coordinator(joint(4, {"r0/0": [0.0, 0.0, 0.0], "r2/0": [0.0, 0.0, 0.0]}))
+    whereabouts.coordinator_here("c", here=False)
+    assert frame_of(whereabouts) == ("r0/0", 4, tuple(POSE))
+
+
+def test_of_two_coordinators_the_first_one_tells_the_frame_until_it_has_left() -> None:
+    whereabouts = Whereabouts("r2", "b", 0)
+    one = joint(3, {"r1/0": [0.0, 0.0, 0.0], "r2/0": [0.0, 0.0, 0.0]})
+    other = joint(1, {"r2/0": [0.0, 0.0, 0.0]}).model_copy(update={"boot": "d"})
+    for status in (one, other, one, other):
+        whereabouts.coordinator(status)
+        assert frame_of(whereabouts) == ("r1/0", 3, tuple(POSE))
+    whereabouts.coordinator_here("c", here=False)
+    for status in (one, other, one):  # a last word may come late
+        whereabouts.coordinator(status)
+    assert frame_of(whereabouts) == ("r2/0", 1, tuple(POSE))
 
 
 def test_while_a_scan_fits_nowhere_the_last_pose_stands_and_says_so() -> None:

@@ -24,7 +24,7 @@ from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.session import open_session
 
 SCANS = 60  # a few seconds of mapping
-PATIENCE = 120.0  # [s] for a machine with much else to do
+PATIENCE = 90.0  # [s] for a machine with much else to do
 
 
 def until(condition: Callable[[], object]) -> None:

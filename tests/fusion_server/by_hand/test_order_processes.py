@@ -1,6 +1,8 @@
 """What a person orders goes before evidence, is told under the person's name, and is taken back."""
 
+import http.client
 import json
+import re
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +19,7 @@ from mapweave_protocol.link.asking import ask_orders
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import ORDER
 from tests.fusion_server.by_hand.conftest import Operator, walk
-from tests.fusion_server.conftest import MakeAlignments, Network, StartServer
+from tests.fusion_server.conftest import MakeAlignments, Network, ServerProcess, StartServer
 
 START_A, START_B = (1.0, 1.0, 0.3), (3.0, 2.0, -2.0)
 A_TO_B = se2.between(START_A, START_B)
@@ -139,6 +141,46 @@ def test_what_is_forbidden_comes_apart_and_stays_apart_until_it_is_taken_back(
         joint = watcher.next()
     assert network.groups(joint) == [["a/0", "b/0"]]
     server.wait_for_log("taken back: anna forbids a/0 and b/0")
+
+
+def _post(server: ServerProcess, wish: dict[str, str]) -> int:
+    """Return the status of what the server's page answers to an order."""
+    server.wait_for_log("live page: ")
+    found = re.search(r"live page: http://([^/]+)/#token=(\S+)", server.log)
+    assert found is not None
+    connection = http.client.HTTPConnection(found[1], timeout=Network.patience)
+    headers = {"Content-Type": "application/json", "X-Mapweave-Token": found[2]}
+    connection.request("POST", "/api/orders", json.dumps(wish), headers)
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+@pytest.mark.slow
+def test_what_is_ordered_on_the_page_is_in_the_next_version_and_kept_by_the_coordinator(
+    network: Network, start_server: StartServer, make_alignments: MakeAlignments, anna: Operator
+) -> None:
+    server = start_server("--http", "127.0.0.1:0")
+    watcher = network.watcher()
+    map_a, map_b = walk("a", START_A), walk("b", START_B)
+    with network.robot("a") as a, network.robot("b") as b:
+        a.publish_map(map_a)
+        watcher.next()
+        b.publish_map(map_b)
+        watcher.next()
+        a.publish_alignments(make_alignments(map_a, map_b, transform=tuple(A_TO_B)))
+        assert network.groups(watcher.next()) == [["a/0", "b/0"]]
+    wish = {"kind": "forbid", "reference": "a/0", "other": "b/0", "by": "ben", "reason": "no"}
+    assert _post(server, wish) == 202
+    parted = watcher.next()
+    assert network.groups(parted) == [["a/0"], ["b/0"]]
+    [order] = parted.orders
+    assert (order.by, order.reason) == ("ben", "no")
+    server.stop()
+    start_server()
+    [kept] = ask_orders(network.connect(), network.team) or []
+    assert kept.id == order.id
+    anna.orders("forbid", "a/0", "b/0", "--undo", "--reason", "yes")
 
 
 @pytest.mark.slow

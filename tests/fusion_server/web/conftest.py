@@ -58,7 +58,13 @@ class Page:
     store: Store
     feed: Feed
 
-    def ask(self, path: str, method: str = "GET", headers: Headers | None = None) -> Answer:
+    def ask(
+        self,
+        path: str,
+        method: str = "GET",
+        headers: Headers | None = None,
+        body: bytes | None = None,
+    ) -> Answer:
         """Return what the server answers; `headers` go before those that are usual."""
         connection = http.client.HTTPConnection(
             self.address.host, self.address.port, timeout=PATIENCE
@@ -67,7 +73,9 @@ class Page:
             connection.putrequest(method, path, skip_host=True)
             for name, value in {"Host": self.address.authority, **(headers or {})}.items():
                 connection.putheader(name, value)
-            connection.endheaders()
+            if body is not None:
+                connection.putheader("Content-Length", str(len(body)))
+            connection.endheaders(body)
             answer = connection.getresponse()
             return Answer(answer.status, answer.headers, answer.read())
         finally:

@@ -19,6 +19,7 @@ from mapweave_fusion_server.web import server
 from mapweave_fusion_server.web.api import Api
 from mapweave_fusion_server.web.events import Bell
 from mapweave_fusion_server.web.feed import CoordinatorReport, RobotReport
+from mapweave_fusion_server.web.orders import PageOrders
 from mapweave_protocol.wire.messages import StatusMessage
 from tests.fusion_server.web.conftest import Page, make_joint
 
@@ -166,7 +167,8 @@ def test_what_the_journal_told_is_told_again(page: Page, caplog: pytest.LogCaptu
 
 def test_the_description_names_everything_that_can_be_asked_for(page: Page) -> None:
     described = page.ask("/api/openapi.json").json["paths"]
-    routes = {route.path.replace(":int", "") for route in Api(Mock(), Bell()).routes}
+    served = [*Api(Mock(), Bell()).routes, *PageOrders(Mock()).routes]
+    routes = {route.path.replace(":int", "") for route in served}
     assert set(described) == routes
 
 

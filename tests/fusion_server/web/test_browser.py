@@ -13,7 +13,10 @@ from playwright.sync_api import Browser, expect
 from playwright.sync_api import Page as Tab
 
 from mapweave.config import Config
+from mapweave.evidence import Evidence
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap
+from mapweave.marks import PlacedMark
+from mapweave.orders import Order, OrderKind
 from mapweave_fusion_server import journal
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import HttpAddress
@@ -191,6 +194,149 @@ def test_a_robot_that_is_killed_is_gone(page: Page, seen: Visit, make_map: MakeM
     expect(seen.tab.locator("#legend")).to_contain_text("robot that is gone")
 
 
+def with_marks(joint: JointMap, *labels: str) -> JointMap:
+    """Return `joint` with a mark of each label in its first component."""
+    component, *others = joint.components
+    marks = tuple(
+        PlacedMark(f"m{k}", label, "anna", 5.0, min(component.robots), np.array([2.0 + k, 2.0]))
+        for k, label in enumerate(labels)
+    )
+    return replace(joint, components=(replace(component, marks=marks), *others))
+
+
+def drawn_texts(seen: Visit) -> list[str]:
+    """Return what is written on the map when it is drawn again."""
+    seen.tab.evaluate(RECORD_TEXTS)
+    seen.tab.locator("#fit").click()
+    seen.tab.wait_for_timeout(300)
+    found: list[str] = seen.tab.evaluate("window.textsDrawn")
+    return found
+
+
+RECORD_TEXTS = """() => {
+  window.textsDrawn = [];
+  const original = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...all) {
+    window.textsDrawn.push(text);
+    return original.call(this, text, ...all);
+  };
+}"""
+
+
+def test_marks_are_on_the_map_and_in_a_list_and_can_be_left_out(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    page.publish(with_marks(make_joint(1, lines, a=0.0), "victim", HOSTILE))
+    expect_version(seen.tab, 1)
+    expect(seen.tab.locator("#marks")).to_contain_text("victim")
+    expect(seen.tab.locator("#marks")).to_contain_text("by anna, on the map of a/0, at 2.0, 2.0 m")
+    expect(seen.tab.locator("#marks")).to_contain_text(HOSTILE)
+    expect(seen.tab.locator("#legend")).to_contain_text("mark")
+    assert {"victim", HOSTILE} <= set(drawn_texts(seen))
+    shown = picture(seen.tab)
+    seen.tab.locator("#layer-marks").uncheck()
+    expect(seen.tab.locator("#legend")).not_to_contain_text("mark")
+    seen.tab.wait_for_timeout(300)
+    assert picture(seen.tab) != shown
+    page.publish(make_joint(2, lines, a=0.0))
+    expect(seen.tab.locator("#marks-section")).to_be_hidden()
+
+
+def test_where_the_search_goes_on_is_on_the_map(page: Page, seen: Visit, lines: LineMap) -> None:
+    page.publish(make_joint(1, lines, a=0.0))
+    expect_version(seen.tab, 1)
+    expect(seen.tab.locator("#legend")).not_to_contain_text("the search goes on")
+    open_room = replace_segments(lines, 4)  # two walls are not there: free space ends nowhere
+    page.publish(make_joint(2, open_room, a=0.0))
+    expect(seen.tab.locator("#legend")).to_contain_text("the search goes on")
+    shown = picture(seen.tab)
+    seen.tab.locator("#layer-frontiers").uncheck()
+    seen.tab.wait_for_timeout(300)
+    assert picture(seen.tab) != shown
+
+
+def joined_with_evidence(version: int, lines: LineMap, *orders: Order) -> JointMap:
+    joint = make_joint(version, lines, a=0.0, b=3.0)
+    [found] = joint.alignments
+    measured = replace(found, evidence=Evidence(common=9.0))
+    return replace(joint, alignments=(measured,), orders=orders)
+
+
+def test_a_join_is_forbidden_after_a_question_and_the_order_is_taken_back_likewise(
+    page: Page, seen: Visit, make_map: MakeMap
+) -> None:
+    maps = make_map("a"), make_map("b")
+    page.publish(joined_with_evidence(1, maps[0].lines(0)), maps)
+    seen.tab.locator("#decisions button.decision").first.click()
+    seen.tab.get_by_role("button", name="Forbid this join…").click()
+    dialog = seen.tab.locator("#order")
+    expect(dialog).to_contain_text("Forbid to join a/0 and b/0?")
+    seen.tab.locator("#order-confirm").click()  # without a name and a reason nothing is sent
+    expect(dialog).to_be_visible()
+    assert page.feed.orders() == []
+    seen.tab.locator("#order-name").fill("anna")
+    seen.tab.locator("#order-reason").fill("two floors")
+    seen.tab.locator("#order-cancel").click()
+    expect(dialog).to_be_hidden()
+    assert page.feed.orders() == []
+    seen.tab.get_by_role("button", name="Forbid this join…").click()
+    seen.tab.locator("#order-name").fill("anna")
+    seen.tab.locator("#order-reason").fill("two floors")
+    seen.tab.locator("#order-confirm").click()
+    expect(dialog).to_be_hidden()
+    [given] = page.feed.orders()
+    assert (given.kind, given.by, given.reason) == (OrderKind.FORBID, "anna", "two floors")
+
+    told = Order(given.id, OrderKind.FORBID, "anna", 5.0, "two floors", "a/0", "b/0")
+    page.publish(joined_with_evidence(2, maps[0].lines(0), told), maps)
+    expect(seen.tab.locator("#orders")).to_contain_text("anna forbids a/0 – b/0")
+    seen.tab.get_by_role("button", name="Take back…").click()
+    expect(seen.tab.locator("#order-name")).to_have_value("anna")  # it is remembered
+    seen.tab.locator("#order-reason").fill("one floor after all")
+    seen.tab.locator("#order-confirm").click()
+    expect(dialog).to_be_hidden()
+    [back] = page.feed.orders()
+    assert (back.takes_back, back.reason) == (given.id, "one floor after all")
+
+
+def test_a_join_is_pinned_as_it_is_shown_and_why_it_cannot_be_is_told(
+    page: Page, seen: Visit, make_map: MakeMap
+) -> None:
+    maps = make_map("a"), make_map("b")
+    page.publish(joined_with_evidence(1, maps[0].lines(0)), maps)
+    seen.tab.locator("#decisions button.decision").first.click()
+    seen.tab.get_by_role("button", name="Pin this join…").click()
+    seen.tab.locator("#order-name").fill("anna")
+    seen.tab.locator("#order-reason").fill("same door")
+    page.publish(joined_with_evidence(2, maps[0].lines(0)), ())  # the maps are gone meanwhile
+    expect_version(seen.tab, 2)
+    seen.tab.locator("#order-confirm").click()
+    expect(seen.tab.locator("#order-problem")).to_have_text("no map of component a/0 is here now")
+    seen.said.clear()  # the browser notes that the server refused
+    page.publish(joined_with_evidence(3, maps[0].lines(0)), maps)
+    expect_version(seen.tab, 3)
+    seen.tab.locator("#order-confirm").click()
+    expect(seen.tab.locator("#order")).to_be_hidden()
+    [given] = page.feed.orders()
+    assert (given.kind, given.reason) == (OrderKind.PIN, "same door")
+    np.testing.assert_allclose(given.transform or (), [3.0, 0.0, 0.0])
+
+
+def test_who_came_without_the_token_gives_no_orders(
+    browser: Browser, page: Page, make_map: MakeMap
+) -> None:
+    maps = make_map("a"), make_map("b")
+    told = Order("0b1", OrderKind.FORBID, "anna", 5.0, "two floors", "a/0", "b/0")
+    page.publish(joined_with_evidence(1, maps[0].lines(0), told), maps)
+    with visit(browser, page.address.url()) as seen:
+        expect_version(seen.tab, 1)
+        expect(seen.tab.locator("#orders")).to_contain_text("anna forbids a/0 – b/0")
+        seen.tab.locator("#decisions button.decision").first.click()
+        expect(seen.tab.locator("#evidence")).to_be_visible()
+        for name in ("Forbid this join…", "Pin this join…", "Take back…"):
+            expect(seen.tab.get_by_role("button", name=name)).to_have_count(0)
+
+
 def test_hostile_text_is_shown_as_text(
     page: Page, seen: Visit, lines: LineMap, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -313,16 +459,23 @@ def test_people_who_cannot_see_it_or_use_no_mouse_can_use_it(
     maps = make_map("a"), make_map("b")
     joint = make_joint(1, maps[0].lines(0), a=0.0, b=0.0)
     alone = JointComponent({"c/0": np.zeros(3)}, 1.0, maps[0].lines(0), np.full(6, 0.5))
-    page.publish(replace(joint, components=(*joint.components, alone)), maps)
+    told = Order("0b1", OrderKind.FORBID, "anna", 5.0, "two floors", "a/0", "c/0")
+    everything = replace(joint, components=(*joint.components, alone), orders=(told,))
+    page.publish(with_marks(everything, "victim"), maps)
     page.feed.show_team((RobotReport("a", 1, None, 5.0, 1),), CoordinatorReport(stamp=5.0))
-    with visit(browser, page.address.url(), dark=dark, phone=phone) as seen:
+    with visit(browser, page.address.url(TOKEN), dark=dark, phone=phone) as seen:
         expect(seen.tab.locator("#team tbody tr")).to_have_count(2)
         seen.tab.locator(".decision").first.click()
         expect(seen.tab.locator("#evidence canvas")).to_have_count(1)
         found = Axe().run(seen.tab)
         assert found.violations_count == 0, found.generate_report()
+        seen.tab.get_by_role("button", name="Take back…").click()
+        found = Axe().run(seen.tab)
+        assert found.violations_count == 0, found.generate_report()
+        seen.tab.keyboard.press("Escape")
         seen.tab.goto(page.address.url() + "api")
-        expect(seen.tab.locator("section")).to_have_count(11)
+        described = page.ask("/api/openapi.json").json["paths"]
+        expect(seen.tab.locator("section")).to_have_count(len(described))
         found = Axe().run(seen.tab)
         assert found.violations_count == 0, found.generate_report()
         assert seen.said == []

@@ -108,6 +108,18 @@ def test_a_log_becomes_a_map_file_and_a_line_of_figures(log: Path, tmp_path: Pat
     assert indices.tolist() == list(range(2, 10))  # counted from the log's first scan
 
 
+def test_figures_are_told_as_json_to_a_program(log: Path) -> None:
+    done = main_here("map", log, "--scans", "2:10", "--json")
+    figures = json.loads(done.stdout)
+    assert {name: figures[name] for name in ("scans", "placed", "largest", "components")} == {
+        "scans": 8,
+        "placed": 8,
+        "largest": 8,
+        "components": 1,
+    }
+    assert figures["segments"] > 0 and figures["path_m"] > 1.5
+
+
 def test_the_poses_in_a_log_change_nothing(
     tmp_path: Path, scans: list[Scan], rng: Generator
 ) -> None:
@@ -304,6 +316,15 @@ def test_maps_that_share_a_place_are_joined_and_all_is_told(
     back = [se2.compose(p, f) for p, f in zip(component.robots.values(), frames, strict=True)]
     middle = [se2.transform_points(pose, np.array([13.0, 1.0])) for pose in back]
     assert np.hypot(*(middle[0] - middle[1])) < 0.1
+
+
+def test_what_was_joined_is_told_as_json_to_a_program(maps: dict[str, Path]) -> None:
+    done = main_here("fuse", maps["a"], maps["b"], "--json")
+    told = json.loads(done.stdout)
+    (alignment,), (component,) = told["alignments"], told["components"]
+    assert (alignment["reference"], alignment["other"]) == ("a/0", "b/0")
+    assert alignment["decision"] == "accepted" and len(alignment["transform"]) == 3
+    assert list(component["robots"]) == ["a/0", "b/0"] and component["segments"] > 0
 
 
 def test_maps_that_cannot_all_be_joined_give_status_3_and_the_rest_of_the_work(

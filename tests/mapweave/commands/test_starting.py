@@ -1,13 +1,17 @@
 """``--continue`` and ``--localize``, and a stored joint map among those to fuse."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mapweave.anchors import anchored, placed_marks
 from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import read_joint, read_map, write_joint, write_map
 from mapweave.maps import JointMap, LineMap, RobotMap, Submap, Trajectory
+from mapweave.marks import Mark
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import AROUND, BUILDING, part, random_pose, scans_along, shaken
 from tests.mapweave.commands.test_commands import assert_fails_in_one_line, main_here, mapweave
@@ -157,6 +161,45 @@ def test_a_robot_that_is_in_the_joint_map_already_is_refused(tmp_path: Path) -> 
 def test_beams_of_the_drive_are_evenly_spread() -> None:
     """What `as_g2o` relies on."""
     np.testing.assert_allclose(np.diff(AROUND[45:316:2]), AROUND[2] - AROUND[0])
+
+
+def marked(path: Path, label: str, position: tuple[float, float]) -> FloatArray:
+    """Mark a place [m], in the frame of component 0, in a stored map; return where it is."""
+    stored = read_map(path)
+    place = np.array(position)
+    held = anchored(stored.submaps, 0, place)
+    assert held is not None
+    mark = Mark("m1", label, "ann", 17.0, *held)
+    write_map(path, replace(stored, marks=(mark,)))
+    return place
+
+
+@pytest.mark.parametrize("option", ["--continue", "--localize"])
+def test_marks_of_the_stored_map_stay_where_they_were(
+    option: str, log: Path, first: Path, tmp_path: Path
+) -> None:
+    stored, output = tmp_path / "marked.json", tmp_path / "out.json"
+    stored.write_bytes(first.read_bytes())
+    place = marked(stored, "victim", (4.0, 0.5))
+    done = main_here("map", log, "--scans", "20:60", option, stored, "--output", output)
+    assert done.returncode == 0
+    (mark,) = placed_marks(read_map(output))
+    assert (mark.label, mark.by, mark.component[-2:]) == ("victim", "ann", "/0")
+    np.testing.assert_allclose(mark.position, place, atol=0.05)
+
+
+def test_marks_of_a_stored_joint_map_come_along(tmp_path: Path) -> None:
+    c = seen("c", part(BUILDING, 0, 18), 0, tmp_path)
+    d = seen("d", part(BUILDING, 8, 30), 1, tmp_path)
+    b = seen("b", part(BUILDING, 10, 30), 2, tmp_path)
+    marked(d, "victim", (1.0, 2.0))
+    stored, output, at_once = (tmp_path / f"{name}.json" for name in ("joint", "out", "at_once"))
+    assert main_here("fuse", c, d, "--output", stored).returncode == 0
+    assert main_here("fuse", stored, b, "--output", output).returncode == 0
+    assert main_here("fuse", b, c, d, "--output", at_once).returncode == 0
+    (one,), (other,) = (read_joint(path).components[0].marks for path in (output, at_once))
+    assert one.component == other.component == "d/0"
+    np.testing.assert_allclose(one.position, other.position, atol=0.1)
 
 
 def test_a_map_servers_grid_becomes_a_robots_map_and_takes_no_start(tmp_path: Path) -> None:

@@ -1,10 +1,12 @@
 """A run that goes on from a stored map."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mapweave.anchors import anchored, placed_marks
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import read_map, write_map
@@ -12,6 +14,7 @@ from mapweave.io.readers import read_scans
 from mapweave.mapping.continuation import links_to_keep
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
+from mapweave.marks import Anchor, Mark
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, scans_along
 
@@ -68,6 +71,23 @@ def test_scans_with_later_numbers_keep_them() -> None:
     before = mapped(scans_along(BUILDING, THERE, 1)[0])
     later = scans_along(BUILDING, AND_BACK, 2, first=1000)[0]
     assert max(where(mapped(later, before))) == 999 + len(later)
+
+
+def test_marks_of_the_stored_map_go_on_with_it() -> None:
+    first, _ = scans_along(BUILDING, THERE, 1)
+    before = mapped(first)
+    found = anchored(before.submaps, 0, np.array([4.0, 0.5]))
+    assert found is not None
+    held_by_scan = Mark("m1", "victim", "anna", 5.0, *found)
+    last = before.submaps[-1]
+    held_by_submap = Mark("m2", "door", "anna", 5.0, Anchor(last.id + 7, None), np.zeros(2))
+    renumbered = tuple(replace(s, id=s.id + 7) for s in before.submaps)
+    stored = replace(before, submaps=renumbered, marks=(held_by_scan, held_by_submap))
+    second, _ = scans_along(BUILDING, AND_BACK, 2, first=len(first))
+    after = mapped(second[:20], stored)
+    victim, door = placed_marks(after)
+    np.testing.assert_allclose(victim.position, [4.0, 0.5], atol=0.1)
+    np.testing.assert_allclose(door.position, after.submaps[last.id].pose[:2], atol=1e-9)
 
 
 def at(number: int, x: float, component: int = 0) -> Submap:

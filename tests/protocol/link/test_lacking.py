@@ -7,8 +7,8 @@ END = 10 * LONGEST  # [s]
 
 def times(lacking: Lacking) -> list[float]:
     """Return when something is done for one that never gets what it lacks."""
-    each_half_second = (half / 2 for half in range(int(2 * END)))
-    return [now for now in each_half_second if lacking.due("a", 1, now, lacks=True)]
+    each_quarter = (quarter / 4 for quarter in range(int(4 * END)))
+    return [now for now in each_quarter if lacking.due("a", 1, now, lacks=True)]
 
 
 def test_nothing_is_done_for_who_lacks_nothing() -> None:

@@ -122,9 +122,43 @@ def test_what_is_told_of_another_series_is_asked_for_only_where_that_one_counts(
 def test_a_gap_that_nobody_can_close_is_skipped_after_some_tries() -> None:
     sequence = JointSequence(whole_up_to=MAX_COUNT)
     sequence.offer(message(5))
-    skipped = [sequence.give_up() for _ in range(MAX_TRIES)]
+    asked = JointQuery(since=0, limit=ASKED_AT_ONCE)
+    skipped = []
+    for _ in range(MAX_TRIES):
+        sequence.answered(asked, [message(5)])
+        skipped.append(sequence.give_up())
     assert skipped == [0] * (MAX_TRIES - 1) + [4]
     assert taken(sequence) == [5]
+
+
+def test_a_gap_that_nobody_has_been_heard_about_is_not_skipped_but_closed_later() -> None:
+    sequence = JointSequence(whole_up_to=MAX_COUNT)
+    sequence.offer(message(3))
+    assert [sequence.give_up() for _ in range(3 * MAX_TRIES)] == [0] * 3 * MAX_TRIES
+    assert delivered_until_quiet(sequence, range(1, 4)) == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("since", "delivered"), [(0, [1, 2, 3, 4]), (2, [3, 4]), (4, []), (9, [1, 2, 3, 4])]
+)
+def test_who_says_since_when_gets_all_after_it(since: int, delivered: list[int]) -> None:
+    sequence = JointSequence(whole_up_to=MAX_COUNT, since=since)
+    sequence.expect("s1", 4)
+    assert delivered_until_quiet(sequence, range(1, 5)) == delivered
+    assert sequence.gap is None
+
+
+def test_of_two_coordinators_that_answer_the_one_followed_is_kept() -> None:
+    sequence = JointSequence(whole_up_to=0)
+    sequence.offer(message(7))
+    assert taken(sequence) == [7]
+    for now in (0.0, 100.0):
+        sequence.expect("s2", 3, now)
+        assert sequence.gap == JointQuery()
+        sequence.answered(JointQuery(), [message(7), message(3, "s2")], now)
+        assert sequence.gap is None
+    sequence.offer(message(8), 101.0)
+    assert taken(sequence) == [8]
 
 
 def test_another_store_is_followed_once_its_coordinator_answers() -> None:
@@ -227,6 +261,9 @@ def test_no_more_than_so_many_wait() -> None:
         JointQuery(since=0),
         JointQuery(since=3, limit=2),
         JointQuery(robot="r1"),
+        JointQuery(robot="r1", boot="3"),
+        JointQuery(of="maps"),
+        JointQuery(since=3, of="alignments"),
     ],
 )
 def test_parsing_undoes_what_a_query_says(query: JointQuery) -> None:
@@ -252,6 +289,10 @@ def test_any_other_parameters_are_refused(parameters: str) -> None:
         "version=-1",
         "version=x",
         "robot=A",
+        "boot=b",
+        "of=poses",
+        "of=maps;robot=r1",
+        "since=1;limit=2;of=maps",
         "robot=",
         "other=1",
         "version",

@@ -280,7 +280,7 @@ def envelope(message: Message, body: bytes) -> bytes:
 
 def test_a_bomb_is_refused_before_it_unfolds() -> None:
     bomb = zlib.compress(bytes(MAX_BODY + 1))
-    payload = encode(status())[:3] + MapMessage.kind + DEFLATED + bomb
+    payload = encode(status())[:3] + MapMessage.letter + DEFLATED + bomb
     with pytest.raises(MessageError, match="decompressed"):
         decode(MapMessage, payload)
 

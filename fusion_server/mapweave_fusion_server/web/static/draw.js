@@ -113,6 +113,37 @@ export function drawPart(context, part, robot, px) {
   context.globalAlpha = 1;
 }
 
+/** Draw where the search goes on: where free space ends and no wall is near. */
+export function drawFrontiers(context, scene, px) {
+  context.strokeStyle = theme().good;
+  context.lineWidth = 3 * px;
+  context.lineCap = "round";
+  context.setLineDash([0.1 * px, 6 * px]);
+  context.stroke(scene.frontiers);
+  context.setLineDash([]);
+}
+
+/** Draw a mark: a cross in a disc, and its label beside it, where no other of `taken` is. */
+export function drawMark(context, camera, place, label, taken) {
+  const [u, v] = camera.toScreen(place[0], place[1]);
+  context.beginPath();
+  context.arc(u, v, 8, 0, 7);
+  context.fillStyle = theme().bad;
+  context.fill();
+  context.strokeStyle = theme().paper;
+  context.lineWidth = 2;
+  context.stroke();
+  context.beginPath();
+  for (const [x, y] of [[-3.5, -3.5], [3.5, -3.5]]) line(context, [u + x, v + y], [u - x, v - y]);
+  context.stroke();
+  context.font = `600 ${FONT}`;
+  const width = context.measureText(label).width;
+  const places = [[u + 12, v - 10], [u - 12 - width, v - 10], [u - width / 2, v + 10], [u - width / 2, v - 30]].map(([left, top]) => [left, top, width, TAG]);
+  const free = places.find((one) => taken.every((other) => !overlap(one, other))) ?? places[0];
+  taken.push(free);
+  write(context, free[0], free[1] + 15, label);
+}
+
 /** Draw a robot at `pose` on the sheet: an arrowhead; hollow when it is gone or lost. */
 export function drawRobot(context, camera, pose, robot, state) {
   const [u, v] = camera.toScreen(pose[0], pose[1]);

@@ -8,6 +8,7 @@ import { metres, percent, robotOf } from "./format.js";
 import { colourOf, theme } from "./palette.js";
 import { floorOf, linesOf } from "./scene.js";
 import { IDENTITY, move } from "./se2.js";
+import { buttonsFor } from "./orders.js";
 import { fetchJson } from "./source.js";
 
 const DOT = 0.06; // [m], half of what a place on a wall stands for
@@ -70,7 +71,7 @@ export class Evidence {
     this.#target.hidden = false;
     this.#target.replaceChildren(
       element("div", { class: "evidence-head" }, chipOf(alignment), endsOf(alignment), element("strong", {}, sure), close),
-      element("p", {}, alignment.reason), ...content);
+      element("p", {}, alignment.reason), ...content, buttonsFor(alignment) ?? "");
     this.#target.querySelectorAll("canvas").forEach((canvas) => canvas.paint(this.#on.turnOf(alignment.reference)));
   }
 }

@@ -6,6 +6,7 @@ import { Evidence } from "./evidence.js";
 import { clock, counted, percent, robotOf } from "./format.js";
 import { fillLegend } from "./legend.js";
 import { MapView } from "./map.js";
+import { fillMarks, fillOrders } from "./orders.js";
 import { onThemeChange, setRobots } from "./palette.js";
 import { fetchJson, follow } from "./source.js";
 import { fillSure } from "./sure.js";
@@ -62,6 +63,8 @@ function show(joint, paths) {
   decisions.show(joint);
   write(byId("decisions-count"), `(${joint.alignments.length})`);
   fillSure(byId("sure"), joint, scenes, showWhy);
+  fillOrders(byId("orders"), joint);
+  fillMarks(byId("marks"), joint);
   write(byId("headline"), headline(scenes));
   write(byId("map-text"), `Version ${joint.version}. ${headline(scenes)}. ${scenes.map(tellScene).join(" ")}`);
   if (map.layers.parts) loadParts();
@@ -84,6 +87,8 @@ function writeLegend() {
   fillLegend(byId("legend"), {
     doubtful: map.stage.actors.some(({ scene }) => scene.doubtful > 0),
     changes: state.against === null ? null : [state.joint.version, state.against],
+    marks: map.layers.marks && map.stage.actors.some(({ scene }) => scene.marks.length > 0),
+    frontiers: map.layers.frontiers && map.stage.actors.some(({ scene }) => scene.hasFrontiers),
     gone: map.hasRobots && (state.team?.robots ?? []).some(({ alive }) => !alive),
   });
 }
@@ -160,7 +165,7 @@ function press(key) {
   return deed ? (deed(), true) : false;
 }
 
-/** Keep the secret that orders will need, and take it out of the address: links are passed on. */
+/** Keep the secret that orders need, and take it out of the address: links are passed on. */
 function takeToken() {
   const given = new URLSearchParams(location.hash.slice(1)).get("token");
   if (given) sessionStorage.setItem("mapweave-token", given);

@@ -16,7 +16,7 @@ const SMALL_MARGINS = { left: 22, right: 22, top: 92, bottom: 66 };
 export class MapView {
   camera = new Camera();
   stage = new Stage();
-  layers = { paths: true, parts: false, grid: true };
+  layers = { paths: true, parts: false, grid: true, marks: true, frontiers: true };
   following = null;
   measuring = null;
   #canvas;
@@ -239,7 +239,9 @@ export class MapView {
     this.stage.actors.forEach((actor, k) => {
       if (!this.stage.isMoving) draw.drawCaption(context, camera, actor, k + 1, this.stage.actors.length);
     });
-    if (this.layers.paths) this.#drawRobots(context, cast);
+    const taken = [];
+    if (this.layers.marks) this.#drawMarks(context, cast, taken);
+    if (this.layers.paths) this.#drawRobots(context, cast, taken);
     if (this.measuring?.length) draw.drawMeasure(context, camera, this.measuring);
     draw.drawScaleBar(context, camera, step);
   }
@@ -257,6 +259,7 @@ export class MapView {
       if (part) this.#inside(context, ratio, { ...actor, pose: compose(actor.pose, pose) }, (px) => draw.drawPart(context, part, robotOf(name), px));
     }
     this.#inside(context, ratio, actor, (px) => draw.drawWalls(context, scene, px));
+    if (this.layers.frontiers) this.#inside(context, ratio, actor, (px) => draw.drawFrontiers(context, scene, px));
     const changes = this.#changes?.get(scene);
     if (changes) this.#inside(context, ratio, actor, (px) => draw.drawChanges(context, changes, px));
     for (const [name, pose] of scene.robots) {
@@ -265,10 +268,21 @@ export class MapView {
     }
   }
 
-  #drawRobots(context, cast) {
+  #drawMarks(context, cast, taken) {
+    const marks = cast.flatMap(({ scene, pose, opacity }) => scene.marks.map(({ position, label }) =>
+      ({ place: compose(pose, [...position, 0]), label, opacity })));
+    taken.push(...marks.map(({ place }) => this.camera.toScreen(place[0], place[1])).map(([u, v]) => [u - 9, v - 9, 18, 18]));
+    for (const { place, label, opacity } of marks) {
+      context.globalAlpha = opacity;
+      draw.drawMark(context, this.camera, place, label, taken);
+    }
+    context.globalAlpha = 1;
+  }
+
+  #drawRobots(context, cast, taken) {
     const there = this.#robots.map((robot) => [this.robotPose(robot, cast), robot, this.#stateOf(robot)]);
     const shown = there.filter(([pose]) => pose !== null);
-    const taken = shown.map(([pose]) => this.camera.toScreen(pose[0], pose[1])).map(([u, v]) => [u - 9, v - 9, 18, 18]);
+    taken.push(...shown.map(([pose]) => this.camera.toScreen(pose[0], pose[1])).map(([u, v]) => [u - 9, v - 9, 18, 18]));
     for (const one of shown) draw.drawRobot(context, this.camera, ...one);
     for (const one of shown) draw.drawTag(context, this.camera, ...one, taken);
   }

@@ -4,7 +4,7 @@ export const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#5
 export const DARK = ["#4fb3f0", "#ff9255", "#3fd0a4", "#eba3cb", "#f5c04a", "#a3dcff", "#d0a27a"];
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
-const NAMES = ["ink", "quiet", "paper", "unknown", "floor", "grid", "wall", "weak-wall", "doubt", "bad", "accent", "line"];
+const NAMES = ["ink", "quiet", "paper", "unknown", "floor", "grid", "wall", "weak-wall", "doubt", "bad", "good", "accent", "line"];
 let tokens = null;
 let robots = [];
 

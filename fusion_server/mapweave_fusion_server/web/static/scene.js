@@ -18,7 +18,10 @@ export function sceneOf(component, strong) {
     walls: Array.from({ length: LEVELS }, () => new Path2D()),
     doubts: new Path2D(),
     floor: floorOf(component.free_space),
-    points: pointsOf(segments, component.free_space, robots),
+    marks: component.marks ?? [],
+    frontiers: runsOf(component.frontiers ?? []),
+    hasFrontiers: (component.frontiers ?? []).length > 0,
+    points: pointsOf(segments, component.free_space, robots, component.marks ?? []),
   };
   segments.forEach(([x1, y1, x2, y2], k) => {
     const strength = Math.min(1, Math.log(Math.max(1, support[k])) / Math.log(strong)) * confidence[k];
@@ -70,9 +73,9 @@ export function runsOf(runs) {
   return path;
 }
 
-function pointsOf(segments, rings, robots) {
+function pointsOf(segments, rings, robots, marks) {
   const ends = segments.flatMap(([x1, y1, x2, y2]) => [[x1, y1], [x2, y2]]);
-  const corners = rings.flat();
+  const corners = [...rings.flat(), ...marks.map(({ position }) => position)];
   const all = ends.length + corners.length ? [...ends, ...corners] : [...robots.values()];
   return all.length > 4 ? hull(all) : all;
 }

@@ -12,6 +12,17 @@ export async function fetchJson(path) {
   return answer.json();
 }
 
+/** Give an order; return null if it is taken, or else why it is not. */
+export async function sendOrder(order) {
+  const headers = { "Content-Type": "application/json", "X-Mapweave-Token": sessionStorage.getItem("mapweave-token") ?? "" };
+  try {
+    const answer = await fetch("/api/orders", { method: "POST", headers, body: JSON.stringify(order) });
+    return answer.ok ? null : (await answer.text()).trim();
+  } catch {
+    return "the coordinator does not answer";
+  }
+}
+
 /** Follow the events; the browser comes again by itself, with the last id it had.
  *
  * @param {object} on  `version`, `team`, `story` and `poses` take what an event says, `contact` true or

@@ -9,11 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 from mapweave.errors import FileError, MissingExtraError
 from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags.beside_scans import BesideScans
 from mapweave.io.readers.ros_bags.laser_messages import (
     LASER_SCAN,
     LaserDecoder,
@@ -69,6 +71,9 @@ class Bag(Protocol):
     def scans(self, topic: str) -> Iterator[Message]:
         """Yield the messages of a laser topic, in the order in which they were recorded."""
 
+    def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
+        """Yield the messages of a type at topics with this `ending`, in that order."""
+
 
 @dataclass(frozen=True, slots=True)
 class WholeBag:
@@ -93,6 +98,14 @@ class WholeBag:
             for connection in self.reader.connections
             if connection.msgtype == LASER_SCAN and connection.topic == topic
         ]
+        yield from self._messages(chosen)
+
+    def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
+        """As of `Bag`."""
+        chosen = [c for c in self.reader.connections if c.msgtype == kind]
+        return self._messages([c for c in chosen if c.topic.endswith(ending)])
+
+    def _messages(self, chosen: Sequence[Any]) -> Iterator[Message]:
         for connection, _, data in self.reader.messages(chosen) if chosen else ():
             yield Message(connection.topic, connection.msgtype, self.encoding, data)
 
@@ -107,16 +120,17 @@ class CutBag:
 
     def lasers(self) -> dict[str, int]:
         """As of `Bag`."""
-        return dict(Counter(message.topic for message in self._scans()))
+        return dict(Counter(message.topic for message in self.of_type(LASER_SCAN)))
 
     def scans(self, topic: str) -> Iterator[Message]:
         """As of `Bag`."""
-        return (message for message in self._scans() if message.topic == topic)
+        return (message for message in self.of_type(LASER_SCAN) if message.topic == topic)
 
-    def _scans(self) -> Iterator[Message]:
-        """Yield the messages of all lasers, up to where damage leads the walk astray."""
+    def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
+        """As of `Bag`, up to where damage leads the walk astray."""
         try:
-            yield from (m for m in self.walk(self.path) if m.type == LASER_SCAN)
+            found = (m for m in self.walk(self.path) if m.type == kind)
+            yield from (m for m in found if m.topic.endswith(ending))
         except damage_errors():
             return  # told as `cut_off` already
 
@@ -143,6 +157,11 @@ class SplitBag:
         """As of `Bag`."""
         for part in self.parts:
             yield from part.scans(topic)
+
+    def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
+        """As of `Bag`."""
+        for part in self.parts:
+            yield from part.of_type(kind, ending)
 
 
 def open_bag(path: Path, bag_format: BagFormat, stack: ExitStack) -> Bag:
@@ -183,20 +202,31 @@ def read_open_bag(path: Path, bag: Bag, options: ReadOptions) -> Iterator[Scan]:
     """Yield the scans of one topic of a bag, which is open."""
     tally = Tally("message", EXPECTED, cut_off=bag.cut_off)
     decoder = LaserDecoder()
+    topic = choose_topic(path, bag, options.topic)
+    beside = BesideScans.of(path, partial(_whole_of_type, bag), decoder, options)
     try:
-        for message in _sound(bag.scans(choose_topic(path, bag, options.topic)), tally):
+        for message in _sound(bag.scans(topic), tally):
             tally.pieces += 1
             try:
-                scan = decoder.scan(message, tally.scans)
+                frame, measured = decoder.framed_scan(message, tally.scans)
             except UnreadableMessageError as error:
                 tally.add_damaged(tally.pieces, error)
                 continue
+            scan = beside.completed(frame, measured)
             tally.add_scan(scan)
             yield scan
         if problem := tally.problem():
             raise FileError(path, problem)
     finally:  # also where nobody wants the rest
         tally.warn(path, options)
+
+
+def _whole_of_type(bag: Bag, kind: str, ending: str = "") -> Iterator[Message]:
+    """Yield those up to where the bag is damaged: reading its scans tells of it."""
+    try:
+        yield from bag.of_type(kind, ending)
+    except damage_errors():
+        return
 
 
 def _sound(messages: Iterator[Message], tally: Tally) -> Iterator[Message]:

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
+ODOMETRY = "nav_msgs/msg/Odometry"
+TF_MESSAGE = "tf2_msgs/msg/TFMessage"
+LONGEST_SWEEP = 1.0  # [s] no lidar turns slower
 ROS1, CDR = "ros1", "cdr"
 """The encodings of ROS 1 and of ROS 2."""
 
@@ -45,14 +48,17 @@ class Message:
 class LaserDecoder:
     """Decodes laser scans by what every release of ROS means by one; needs `rosbags`.
 
-    The definitions that a bag brings along are not needed: this message has not changed since
-    ROS 1, and bags hold definitions of other messages that nobody can read.
+    So it does transforms and odometry. The definitions that a bag brings along are not needed:
+    these have not changed since ROS 1, and bags hold definitions of others that nobody can read.
     """
 
     def __init__(self) -> None:
-        from rosbags.typesys import Stores, get_typestore
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
         self._ros1: Typestore = get_typestore(Stores.ROS1_NOETIC)
+        # What `rosbags` knows of ROS 1 has no message of transforms.
+        transforms = "geometry_msgs/TransformStamped[] transforms"
+        self._ros1.register(get_types_from_msg(transforms, TF_MESSAGE))
         self._ros2: Typestore = get_typestore(Stores.ROS2_HUMBLE)
 
     def scan(self, message: Message, index: int) -> Scan:
@@ -63,15 +69,30 @@ class LaserDecoder:
         UnreadableMessageError
             If it is not whole, or its angles are none.
         """
+        return self.framed_scan(message, index)[1]
+
+    def framed_scan(self, message: Message, index: int) -> tuple[str, Scan]:
+        """Return the frame of the laser, and the scan in `message`; as `scan`."""
+        laser = self.decode(message, LASER_SCAN)
         try:
-            return _scan(self._decode(message), index)
-        except (_serde_error(), struct.error, ValueError, IndexError) as error:
+            return str(laser.header.frame_id), _scan(laser, index)
+        except (ValueError, IndexError) as error:
             raise UnreadableMessageError(str(error) or "is not whole") from error
 
-    def _decode(self, message: Message) -> Any:  # noqa: ANN401 - made at run time from its definition
-        if message.encoding == ROS1:
-            return self._ros1.deserialize_ros1(message.data, LASER_SCAN)
-        return self._ros2.deserialize_cdr(message.data, LASER_SCAN)
+    def decode(self, message: Message, kind: str) -> Any:  # noqa: ANN401 - made from its definition
+        """Return `message` as what its `kind` has.
+
+        Raises
+        ------
+        UnreadableMessageError
+            If it is not whole.
+        """
+        try:
+            if message.encoding == ROS1:
+                return self._ros1.deserialize_ros1(message.data, kind)
+            return self._ros2.deserialize_cdr(message.data, kind)
+        except (_serde_error(), struct.error, ValueError, IndexError) as error:
+            raise UnreadableMessageError(str(error) or "is not whole") from error
 
 
 def _serde_error() -> type[Exception]:
@@ -95,4 +116,10 @@ def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
         range_min=laser.range_min if laser.range_min > 0 else 0.0,  # also where it is NaN
         index=index,
         stamp=stamp.sec + stamp.nanosec * 1e-9,
+        time_increment=_increment(laser.time_increment, len(measured)),
     )
+
+
+def _increment(stated: float, beams: int) -> float:
+    """Return [s] from beam to beam; 0 where what is stated is no time that a sweep takes."""
+    return float(stated) if 0 < stated * beams <= LONGEST_SWEEP else 0.0

@@ -37,10 +37,10 @@ class WireMark(WireModel):
     @classmethod
     def pack(cls, mark: Mark) -> Self:
         """Return `mark` for the wire."""
-        x, y = (float(number) for number in mark.position)
+        x, y = (round(float(number), 4) for number in mark.position)
         held_by = mark.anchor
         return cls(
-            id=mark.id, label=mark.label, by=mark.by, time=float(mark.time),
+            id=mark.id, label=mark.label, by=mark.by, time=round(float(mark.time), 3),
             submap=held_by.submap, scan=held_by.scan, x=x, y=y,
         )  # fmt: skip
 
@@ -98,9 +98,9 @@ class WirePlacedMark(WireModel):
     @classmethod
     def pack(cls, mark: PlacedMark) -> Self:
         """Return `mark` for the wire."""
-        x, y = (float(number) for number in mark.position)
+        x, y = (round(float(number), 4) for number in mark.position)
         return cls(
-            id=mark.id, label=mark.label, by=mark.by, time=float(mark.time),
+            id=mark.id, label=mark.label, by=mark.by, time=round(float(mark.time), 3),
             component=mark.component, x=x, y=y,
         )  # fmt: skip
 

@@ -14,16 +14,13 @@ class WireRun(WireModel):
     ----------
     robot, boot
         Name it.
-    version
-        Of its map.
-    components
-        The numbers of its components.
+    last
+        The number of its last component.
     """
 
     robot: Id
     boot: Id
-    version: Count
-    components: tuple[Count, ...] = Field(max_length=MAX_ALIGNMENTS)
+    last: Count
 
 
 class RunsMessage(Message):

@@ -1,8 +1,11 @@
 """A robot set down in a known map: it finds itself, is followed, and claims no place it is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from mapweave.anchors import placed_marks
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.localization.known_map import KnownMap
@@ -10,6 +13,7 @@ from mapweave.mapping.localization.localizer import Localizer
 from mapweave.mapping.localization.place_finder import Place, Search
 from mapweave.mapping.placement import Placement
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
+from mapweave.marks import Anchor, Mark, PlacedMark
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import (
     BUILDING,
@@ -76,6 +80,21 @@ def test_the_known_map_stays_as_it_is_and_says_nothing_of_those_who_mapped_it() 
     assert first.map is known.submaps[0].map
     assert len(first.trajectory.scan_index) == 0
     assert all(len(submap.map.segments) == 0 for submap in paths)
+
+
+def test_what_is_marked_in_the_known_map_stays_where_it_is() -> None:
+    somewhere = random_pose(np.random.default_rng(1))
+    known = stored(part(BUILDING, 0, 30), somewhere)
+    mark = Mark("m1", "victim", "anna", 5.0, Anchor(7, 1), np.array([1.0, 2.0]))
+    robot_map = Localizer(KnownMap.of(replace(known, marks=(mark,)))).robot_map()
+    [placed] = placed_marks(robot_map)
+    assert (placed.label, placed.component) == ("victim", "r1/2")
+    np.testing.assert_allclose(placed.position, [1.0, 2.0])  # its scan was at the origin
+
+    lies = PlacedMark("m2", "door", "anna", 5.0, "a/0", np.array([3.0, 4.0]))
+    one = JointComponent({"a/0": np.zeros(3)}, 1.0, known.lines(2), np.ones(1), (lies,))
+    [placed] = placed_marks(Localizer(KnownMap.of(JointMap(1, (one,), ()))).robot_map())
+    np.testing.assert_allclose(placed.position, [3.0, 4.0])
 
 
 def test_a_robot_in_another_building_is_nowhere() -> None:

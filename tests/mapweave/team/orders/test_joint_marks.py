@@ -93,6 +93,13 @@ def test_a_mark_is_at_its_place_in_the_joint_map() -> None:
     np.testing.assert_allclose(mark.position, expected, atol=0.1)
 
 
+def test_a_mark_that_two_maps_have_is_in_the_joint_map_once() -> None:
+    rng = np.random.default_rng(8)
+    maps = [robot_map(rng, robot, ((0.0, 12.0), (10.0, 20.0)), (0, 0)) for robot in "ab"]
+    joint = fuse([marked(some_map, 0, PLACE) for some_map in maps])
+    assert [mark.id for component in joint.components for mark in component.marks] == ["m1"]
+
+
 def test_what_ties_two_components_says_the_same_of_them_as_the_transform() -> None:
     rng = np.random.default_rng(9)
     one, two = robot_map(rng, "a"), robot_map(rng, "b")

@@ -48,6 +48,11 @@ class Mounting:
         return cls(x, y, math.radians(degrees), upside_down)
 
     @property
+    def degrees(self) -> float:
+        """Where its beam of angle 0 looks [°]."""
+        return math.degrees(self.theta)
+
+    @property
     def pose(self) -> FloatArray:
         """(3,) of the laser in the robot's frame [m, m, rad]."""
         return np.array([self.x, self.y, self.theta])
@@ -58,4 +63,6 @@ class Mounting:
             return scan
         angles = -scan.angles if self.upside_down else scan.angles
         # Scan itself puts them in ascending order again.
-        return Scan(scan.ranges, angles + self.theta, scan.index, scan.stamp, scan.odometry)
+        return Scan(
+            scan.ranges, angles + self.theta, scan.index, scan.stamp, scan.odometry, scan.sweep
+        )

@@ -1,0 +1,1 @@
+"""What a team comes to when links and processes fail."""

@@ -1,0 +1,120 @@
+"""What a bag says beside its scans: where the laser sits, and the robot's odometry."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+from mapweave.errors import FileError
+from mapweave.geometry import se2
+from mapweave.io.readers.odometry_track import OdometryTrack
+from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags.frames import (
+    TF,
+    TF_STATIC,
+    StaticFrames,
+    TiltedError,
+    odometry_in,
+)
+from mapweave.io.readers.ros_bags.laser_messages import (
+    ODOMETRY,
+    TF_MESSAGE,
+    LaserDecoder,
+    Message,
+    UnreadableMessageError,
+)
+from mapweave.scan.mounting import Mounting
+from mapweave.scan.scan import Scan
+
+
+class OfType(Protocol):
+    """Yields the messages of a type, at topics with an ending."""
+
+    def __call__(self, kind: str, ending: str = "") -> Iterator[Message]:
+        """Yield them."""
+
+
+@dataclass(frozen=True, slots=True)
+class BesideScans:
+    """Completes scans by what else a bag holds.
+
+    A scan of a laser whose place on the robot is known has its angles as the robot has them: 0 is
+    straight ahead, however the laser is turned, and whichever side of it is up.
+    """
+
+    path: Path
+    frames: StaticFrames
+    odometry: OdometryTrack | None
+
+    @classmethod
+    def of(
+        cls, path: Path, of_type: OfType, decoder: LaserDecoder, options: ReadOptions
+    ) -> "BesideScans":
+        """Read it, all at once.
+
+        Parameters
+        ----------
+        of_type
+            As of a bag.
+
+        Raises
+        ------
+        FileError
+            If odometry is asked for, and there is none, or several of which none was named.
+        """
+        frames = StaticFrames()
+        for message in of_type(TF_MESSAGE, TF_STATIC):
+            try:
+                frames.add(decoder.decode(message, TF_MESSAGE))
+            except UnreadableMessageError:
+                continue  # a transform less; scans are what is counted
+        return cls(path, frames, _odometry(path, of_type, decoder, options))
+
+    def completed(self, frame: str, scan: Scan) -> Scan:
+        """Return `scan`, taken in `frame`, as the robot has it, with the odometry of its moment."""
+        try:
+            mounting = self.frames.mounting(frame) or Mounting()
+        except TiltedError as error:
+            raise FileError(
+                self.path, f"the laser in frame {frame!r} {error}; expected one that looks level"
+            ) from error
+        turned = mounting.turned(scan)
+        robot = None if self.odometry is None else self.odometry.at(scan.stamp)
+        if robot is None:
+            return turned
+        # Turned as the robot is, but where the laser is.
+        return replace(turned, odometry=se2.compose(robot, [mounting.x, mounting.y, 0.0]))
+
+
+def _odometry(
+    path: Path, of_type: OfType, decoder: LaserDecoder, options: ReadOptions
+) -> OdometryTrack | None:
+    """Return the odometry that is asked for; None where none is."""
+    asked = options.odometry_topic
+    if not options.odometry and asked is None:
+        return None
+    kind = TF_MESSAGE if asked is not None and asked.endswith(TF) else ODOMETRY
+    topics: Counter[str] = Counter()
+    track = OdometryTrack()
+    for message in of_type(kind):
+        topics[message.topic] += 1
+        if asked is None or message.topic.strip("/") == asked.strip("/"):
+            _take(track, message, kind, decoder)
+    listed = ", ".join(f"{topic} ({count})" for topic, count in sorted(topics.items())) or "none"
+    if asked is None and len(topics) > 1:
+        raise FileError(path, f"has odometry at {listed}; name one with --odometry TOPIC")
+    if asked is None and not topics:
+        raise FileError(path, f"has no {ODOMETRY}; expected one, or --odometry /tf, or none")
+    if asked is not None and not any(t.strip("/") == asked.strip("/") for t in topics):
+        raise FileError(path, f"has no odometry at {asked}; there is {listed}")
+    return track
+
+
+def _take(track: OdometryTrack, message: Message, kind: str, decoder: LaserDecoder) -> None:
+    try:
+        decoded = decoder.decode(message, kind)
+    except UnreadableMessageError:
+        return
+    for stamp, pose in odometry_in(decoded):
+        track.add(stamp, pose)
