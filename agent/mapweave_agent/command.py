@@ -18,6 +18,7 @@ from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import UnusableOdometryError
 from mapweave.fusion.align import FusionParameters, align
+from mapweave.garbage import spared
 from mapweave.ids import check_id
 from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
@@ -137,7 +138,8 @@ def _run(options: argparse.Namespace) -> int:
         run = AgentRun(
             session, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
         )
-        _run_on(source, run, options)
+        with spared():
+            _run_on(source, run, options)
     return 0
 
 

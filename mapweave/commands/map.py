@@ -19,6 +19,7 @@ from mapweave.commands.progress import busy, track
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import FileError
+from mapweave.garbage import spared
 from mapweave.ids import check_id
 from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save
@@ -142,9 +143,10 @@ def _map_all(
     total = None if scans is None else options.scans.count(scans)
     name = Path(options.log).name
     taken = 0
-    for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
-        mapper.add(scan)
-        taken += 1
+    with spared():
+        for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
+            mapper.add(scan)
+            taken += 1
     return mapper.finish(), taken
 
 

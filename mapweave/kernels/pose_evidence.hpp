@@ -68,7 +68,8 @@ inline void bind_pose_evidence(nb::module_& m) {
              new (self) Settings{overlap, clearance, witnesses, {sight, far_sight, facing}};
            },
            nb::arg("overlap"), nb::arg("clearance"), nb::arg("witnesses"), nb::arg("sight"), nb::arg("far_sight"),
-           nb::arg("facing"));
+           nb::arg("facing"))
+      .def("__deepcopy__", [](const Settings& self, nb::handle) { return self; }, nb::arg("memo"));
   m.def("pose_evidence", &pose_evidence::pose_evidence, nb::arg("known"), nb::arg("viewpoints"), nb::arg("points"),
         nb::arg("normals"), nb::arg("poses"), nb::arg("settings"));
 }

@@ -16,6 +16,7 @@ namespace proposals {
 
 constexpr double kTurn = 6.283185307179586476925286766559;
 constexpr double kHalfTurn = kTurn / 2;
+constexpr double kRounding = 1e-9;  // by which a square root may differ from hypot, amply
 
 // In (-pi, pi].
 inline double wrap(double angle) {
@@ -203,8 +204,10 @@ inline std::tuple<Out<int64_t>, Out<int64_t>, Out<double>, Out<double>, Out<doub
     for (size_t j = 0; j < columns; ++j) {
       const double re = product(i, j, 0), im = product(i, j, 1), squared = re * re + im * im;
       if (!(squared >= least)) continue;
+      const double straighter = std::max(straight(i), other_straight(j));
+      if (std::sqrt(squared) - straighter < min_gain - kRounding) continue;  // most of them: without hypot
       const double similarity = std::min(std::hypot(re, im), 1.0);
-      const double more = similarity - std::max(straight(i), other_straight(j));
+      const double more = similarity - straighter;
       if (!(more > min_gain)) continue;
       gain[i * columns + j] = std::nearbyint(more * 1e9) / 1e9;
       found.push_back(i * columns + j);

@@ -59,6 +59,7 @@ inline std::tuple<Out<int64_t>, Out<int64_t>, Out<int64_t>> agreeing(In<double, 
     if (!left[best]) continue;
     for (size_t k = 0; k < n; ++k) {
       const double dx = place(k, 0) - place(best, 0), dy = place(k, 1) - place(best, 1);
+      if (std::abs(dx) > distance || std::abs(dy) > distance) continue;  // most of them
       if (!(std::hypot(dx, dy) <= distance && std::abs(proposals::wrap(turn(k) - turn(best))) <= angle)) continue;
       members.push_back(static_cast<int64_t>(k));
       left[k] = false;

@@ -35,6 +35,7 @@ from mapweave.parameters import StageParameters, derived
 from mapweave.scan.own_body import OwnBody, OwnBodyParameters
 from mapweave.scan.scan import UNNUMBERED, Scan
 
+AT_ONCE = 2  # scans that wait are placed with each one that comes: a loss holds nobody up
 SUSPENSE = 24  # times the patience, while it is open whether a robot sees itself
 
 
@@ -116,6 +117,8 @@ class Mapper:
         self._component = self._newest_component = first_component(self._finished)
         self._on_warning = on_warning
         self._body = OwnBody(self.parameters.own_body)
+        # Scans to be placed: the last, and after a loss those that were missed before it.
+        self._waiting: deque[Observation] = deque()
         # Raw scans so far, as long as no submap is finished.
         self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._tracker = Tracker(self.parameters.tracker)
@@ -174,6 +177,8 @@ class Mapper:
         if self._is_finished:
             return self.robot_map()
         self._is_finished = True
+        while self._waiting:
+            self._take_first()
         self._merge_all(self._tracker.settle())
         if not self._growing.is_empty:
             self._finish_submap()
@@ -228,13 +233,25 @@ class Mapper:
             self._early.append(scan)
         straight = self._deskewer.straight(self._body.without(scan))
         seen = self.seen = observe(straight, self.parameters.observation)
+        self._waiting.append(seen)
+        placed = lost = False
+        for _ in range(AT_ONCE):
+            if self._waiting:
+                is_last = self._waiting[0] is seen
+                found, was_lost = self._take_first()
+                placed, lost = placed or (found and is_last), lost or was_lost
+        return placed, lost
+
+    def _take_first(self) -> tuple[bool, bool]:
+        """Follow the robot to the first scan that waits; return the same of it."""
+        seen = self._waiting.popleft()
         placed = self._place(seen)
         if placed:
-            self._deskewer.placed(straight.stamp, self._tracker.pose)
+            self._deskewer.placed(seen.scan.stamp, self._tracker.pose)
         if len(self._tracker.missed) < self._patience(seen):
             return placed, False
         self._start_again()
-        return scan.index in self._merged, True
+        return False, True
 
     def _patience(self, seen: Observation) -> int:
         """How many scans may be missed: more until it is known whether the robot sees itself.
@@ -255,6 +272,7 @@ class Mapper:
             return
         early = list(self._early)
         self._early.clear()
+        self._waiting.clear()
         self._tracker = Tracker(self.parameters.tracker)
         self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
@@ -303,9 +321,9 @@ class Mapper:
         return LineMap.union(last + growing)
 
     def _start_again(self) -> None:
-        """Begin a new component with the scans that wait; they fit each other or wait on."""
+        """Begin a new component with the scans that were missed; they fit each other or wait on."""
         self._tracker.take_back()
-        waiting = self._tracker.missed
+        self._waiting.extendleft(reversed(self._tracker.missed))
         if not self._growing.is_empty:
             self._finish_submap()
         if any(s.component == self._component for s in self._finished):
@@ -314,8 +332,6 @@ class Mapper:
         self._tracker = self._tracker.afresh()
         self._deskewer = Deskewer()
         self._origin = self._frame = se2.IDENTITY
-        for seen in waiting:
-            self._place(seen)
 
     def _merge(self, seen: Observation, tracked: ScanMatch) -> None:
         """Merge a scan where it was found, tracker's frame, into the growing submap."""

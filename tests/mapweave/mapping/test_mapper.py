@@ -1,6 +1,7 @@
 """The mapper follows a robot from its scans alone, notices when it is lost, and finds it again."""
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,9 +16,11 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import write_map
 from mapweave.io.readers import read_reference_poses, read_scans
 from mapweave.mapping.backend import BackendResult, FinishedSubmap
-from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.mapper import AT_ONCE, Mapper
 from mapweave.mapping.placement import Placement
-from mapweave.maps import RobotMap, Submap, Trajectory
+from mapweave.mapping.tracking.observation import Observation
+from mapweave.mapping.tracking.tracker import Found, Tracker
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import (
     BUILDING,
@@ -183,6 +186,40 @@ def test_a_kidnapped_robot_starts_a_component_where_nothing_fits(kidnapped: Run)
     out = len(scans_along(BUILDING, TOUR[:5], 1)[0])
     before, after = where[out - 1][0], where[out + 15][0]
     assert before == 0 and after != 0
+
+
+def test_a_loss_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What waited is placed with the scans that come next, two with each, however many waited."""
+    asked = 0
+    place = Tracker.place
+
+    def counted(tracker: Tracker, seen: Observation, known: Callable[[], LineMap]) -> Found:
+        nonlocal asked
+        asked += 1
+        return place(tracker, seen, known)
+
+    monkeypatch.setattr(Tracker, "place", counted)
+    mapper, costs, lost = Mapper("a"), [], 0
+    for scan in jumping():
+        asked = 0
+        lost += mapper.add(scan).lost
+        costs.append(asked)
+    assert lost and max(costs) == AT_ONCE < mapper.parameters.patience
+    assert costs[-1] == 1  # it has caught up
+
+
+def test_a_map_that_ends_with_a_loss_holds_the_scans_that_waited() -> None:
+    mapper, scans = Mapper("a"), jumping()
+    last = next(scan.index for scan in scans if mapper.add(scan).lost)
+    where = placed(mapper.finish())
+    assert where[last][0] == where[last - 1][0] != 0
+
+
+def jumping() -> list[Scan]:
+    """Return scans of a robot that is carried into another building."""
+    here, _ = scans_along(BUILDING, TOUR[:2], 1)
+    there, _ = scans_along(OTHER_BUILDING, [(5, 1.5), (9, 1.5), (9, -3), (9, 1.5)], 2)
+    return [*here, *(replace(scan, index=scan.index + len(here)) for scan in there)]
 
 
 def test_a_robot_that_comes_back_is_reunited_with_what_it_knew(kidnapped: Run) -> None:
