@@ -244,12 +244,14 @@ class Store:
     def map_with_component(self, robot: str, component: int) -> bytes | None:
         """Return the map of the run that the component of that number is, or was, of.
 
-        A run numbers its components above those of the runs before it.
+        A run numbers its components above those of the runs before it; where it could not, `robot`
+        names its boot as well.
         """
+        robot, _, boot = robot.partition("@")
         numbers = self._database.rows(
-            "SELECT rowid FROM robot_map WHERE robot = ? AND last_component >= ?"
-            " ORDER BY last_component LIMIT 1",
-            robot, component,
+            "SELECT rowid FROM robot_map WHERE robot = ? AND ? IN ('', boot)"
+            " AND last_component >= ? ORDER BY last_component LIMIT 1",
+            robot, boot, component,
         )  # fmt: skip
         return next(
             iter(self._messages("robot_map", ((n, f"of {robot}") for (n,) in numbers))), None

@@ -194,4 +194,8 @@ def test_a_run_is_found_by_any_of_its_components(tmp_path: Path) -> None:
         store.keep_map(("b", "z"), 0, 1.0, b"another")
         found = [store.map_with_component("a", number) for number in range(6)]
         assert found == [b"earlier"] * 2 + [b"later"] * 3 + [None]
-        assert store.runs() == [("a", "x", 1), ("a", "y", 4), ("b", "z", 0)]
+        store.keep_map(("a", "w"), 4, 1.0, b"of the same numbers")
+        named = [store.map_with_component(f"a@{boot}", 4) for boot in "yw"]
+        assert named == [b"later", b"of the same numbers"]
+        assert store.map_with_component("a@v", 0) is None
+        assert sorted(store.runs()) == [("a", "w", 4), ("a", "x", 1), ("a", "y", 4), ("b", "z", 0)]

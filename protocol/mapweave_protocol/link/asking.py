@@ -87,7 +87,8 @@ def ask_map_of_component(
         If the answer is not valid, or is another robot's map.
     """
     answers = _ask(session, team, JointQuery(component=component), MapMessage, timeout)
-    if any(message.robot != parse_component(component)[0] for message in answers):
+    robot = parse_component(component)[0].partition("@")[0]
+    if any(message.robot != robot for message in answers):
         raise MessageError(MapMessage.format, f"answer about another robot than of {component!r}")
     return max(answers, key=lambda message: message.version, default=None)
 

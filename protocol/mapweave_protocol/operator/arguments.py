@@ -83,7 +83,10 @@ def component(text: str) -> str:
         If it is none.
     """
     try:
-        check_id("robot", parse_component(text)[0])
+        robot, at, boot = parse_component(text)[0].partition("@")
+        check_id("robot", robot)
+        if at:
+            check_id("boot", boot)
     except MapweaveError as error:
         raise ValueError(str(error)) from error
     return text
