@@ -14,11 +14,11 @@ from mapweave.cli import (
     config_of,
     positive,
 )
+from mapweave.commands.garbage import spared
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import UnusableOdometryError
 from mapweave.fusion.align import FusionParameters, align
-from mapweave.garbage import spared
 from mapweave.ids import check_id
 from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange

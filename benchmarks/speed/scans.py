@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.logs import find_logs
 from benchmarks.speed.rows import Report, Row, timed
-from mapweave.garbage import spared
+from mapweave.commands.garbage import spared
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.readers import read_scans
 from mapweave.mapping.mapper import Mapper

@@ -15,11 +15,11 @@ from mapweave.cli import (
     argument,
     config_of,
 )
+from mapweave.commands.garbage import spared
 from mapweave.commands.progress import busy, track
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import FileError
-from mapweave.garbage import spared
 from mapweave.ids import check_id
 from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save

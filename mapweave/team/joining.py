@@ -17,9 +17,9 @@ from mapweave.matching.distance_field import DistanceField, DistanceFieldParamet
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.free_space import FreeSpaceParameters, rings, unite
 from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster
-from mapweave.team.merging_tree import KnownMergings, Walls, merge_all
 from mapweave.team.recent import Recent
-from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
+from mapweave.team.walls.merging_tree import KnownMergings, Walls, merge_all
+from mapweave.team.walls.segment_confidence import SegmentConfidenceParameters, segment_confidence
 
 STEPS = np.array(
     [2e-3, 2e-3, 2e-4]

@@ -7,7 +7,7 @@ from numpy.random import Generator
 from mapweave.geometry import se2
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
-from mapweave.team.segment_confidence import SegmentConfidenceParameters, segment_confidence
+from mapweave.team.walls.segment_confidence import SegmentConfidenceParameters, segment_confidence
 from tests.mapweave.buildings import line_map, random_pose, rectangle, walls_of
 
 P = SegmentConfidenceParameters()

@@ -4,7 +4,7 @@ import gc
 
 import pytest
 
-from mapweave.garbage import spared
+from mapweave.commands.garbage import spared
 
 
 def test_what_is_there_is_spared_while_a_block_lasts_and_collected_afterwards() -> None:

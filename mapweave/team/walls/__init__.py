@@ -1,0 +1,1 @@
+"""The walls of a joint map: merged, and how sure each of them is."""
