@@ -257,8 +257,9 @@ class AgentRun:
     @property
     def _state_told(self) -> object:
         """What others are told at once when it changes."""
-        compared = self._finished and dict(self._comparisons.published)
-        return compared, len(self._published.components), self._reception.lacking
+        # Who still drives says so soon anyway.
+        now = self._finished and (dict(self._comparisons.published), self._comparisons.held)
+        return now, len(self._published.components), self._reception.lacking
 
     def _supply(self, now: float) -> None:
         """Send again what others lack, answer who has asked, and ask for what is lacking here."""

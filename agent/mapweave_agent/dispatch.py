@@ -1,6 +1,7 @@
 """What a robot hears of its team, handed on to its plan of comparisons."""
 
 import logging
+import math
 import time
 
 from mapweave_agent.by_hand.kept_orders import KeptOrders
@@ -25,6 +26,7 @@ from mapweave_protocol.link.lacking import Lacking
 from mapweave_protocol.wire.messages import StatusMessage
 
 MAX_PEERS = 64  # with a map here
+SILENCE = 2.5  # [s] in which a coordinator, which speaks once a second, is not heard
 FAR = 1_000_000  # versions from one message to the next: eleven days of one a second
 
 _log = logging.getLogger(__name__)
@@ -74,6 +76,7 @@ class Dispatcher:
         self._namesakes.take(boot, here=True)
         self._assembler = MapAssembler()
         self._met = False
+        self._heard = -math.inf
         self._incomplete: frozenset[str] = frozenset()
 
     @property
@@ -135,10 +138,16 @@ class Dispatcher:
     def _take_joint_status(self, arrival: Arrival) -> None:
         status = self._joint_statuses.read(arrival)
         if status is not None:
+            self._heard_coordinator(time.monotonic())
             self._needs.coordinator(status)
             self._plan.coordinator(status)
             self._whereabouts.coordinator(status)
             self._orders.coordinator(status)
+
+    def _heard_coordinator(self, now: float) -> None:
+        """Note that a coordinator speaks; after a silence the link was away, though nobody left."""
+        self._met |= now - self._heard > SILENCE
+        self._heard = now
 
     def _take_map(self, arrival: Arrival) -> None:
         message = self._maps.read(arrival)

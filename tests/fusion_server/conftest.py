@@ -34,12 +34,14 @@ from mapweave.maps import (
 )
 from mapweave.reasons import Reason
 from mapweave_protocol.link import session
+from mapweave_protocol.link.asking import ask_joint_maps
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Inbox, joint_reader
 from mapweave_protocol.link.joint_changes import JointAssembler
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
+from mapweave_protocol.wire.queries import JointQuery
 
 MakeMap: TypeAlias = Callable[..., RobotMap]
 MakeAlignments: TypeAlias = Callable[..., AlignmentMessage]
@@ -181,6 +183,7 @@ class Watcher:
 
     def __init__(self, connection: zenoh.Session, team: str, stack: ExitStack) -> None:
         self._inbox = Inbox()
+        self._connection, self._team = connection, team
         key = keys.JOINT_MAP.build(team=team)
         stack.enter_context(session.declare_subscriber(connection, key, self._inbox.put))
         self._reader = joint_reader()
@@ -200,6 +203,10 @@ class Watcher:
         message = self._reader.read(arrival)
         assert message is not None
         whole = self._assembler.update(message)
+        if whole is None:  # what changed since a version from before it listened
+            query = JointQuery(version=message.version)
+            [answer] = ask_joint_maps(self._connection, self._team, query)
+            whole = self._assembler.update(answer)
         assert whole is not None
         return whole.unpack()
 

@@ -47,6 +47,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "CoverageParameters": {"reach": 0.35},
     "DecisionParameters": {"min_confidence": 0.85},
     "DistanceFieldParameters": {"cell": 0.1, "spacing": 0.2},
+    "EncounterParameters": {},
     "FftCorrelationParameters": {"clearance": 0.5},
     "FittingParameters": {"tolerance": 0.09, "max_hole": 0.3},
     "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15, "cell": 0.05, "simplification": 0.1},
@@ -82,6 +83,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "OwnBodyParameters": {"still": 0.06, "moved": 0.1, "edge": 0.25, "depth": 0.1},
     "PartParameters": {"length": 36.0},
     "PlaceFinderParameters": {},
+    "PlaceIndexParameters": {},
     "PlaceRecognitionParameters": {},
     "PoseCovarianceParameters": {"noise": 0.1},
     "ReachabilityParameters": {

@@ -60,4 +60,9 @@ def _made(roster: Roster, folder: Path, options: argparse.Namespace) -> Iterator
     return make_keys(roster, folder, datetime.now(UTC), options.days, options.hosts)
 
 
-command = Command("Make the certificates of a team, and its router's rules.", _configure, _run)
+command = Command(
+    "Make the certificates of a team, and its router's rules.",
+    _configure,
+    _run,
+    "rescue --robots r1 r2 --operators anna --viewers screen",
+)

@@ -186,4 +186,4 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if team.coordinators else EXIT_FAILED
 
 
-command = Command("Tell how each of a team is.", _configure, _run)
+command = Command("Tell how each of a team is.", _configure, _run, "--team rescue")
