@@ -7,6 +7,9 @@ import time
 from collections.abc import Mapping
 
 ADDRESS, INTERVAL = "NOTIFY_SOCKET", "WATCHDOG_USEC"
+PATIENCE = (
+    1.0  # [s] with a manager that has not read ten messages: what is said once must not be lost
+)
 
 
 class ServiceManager:
@@ -31,17 +34,17 @@ class ServiceManager:
         """Say that the main loop turns; the first time, that the service is ready."""
         if not self._ready:
             self._ready = True
-            self._say("READY=1")
+            self._say("READY=1", PATIENCE)
         now = time.monotonic()
         if self._pause is not None and now >= self._next:
             self._next = now + self._pause
-            self._say("WATCHDOG=1")
+            self._say("WATCHDOG=1", 0.0)  # the next one says the same
 
     def stopping(self) -> None:
         """Say that the service ends."""
-        self._say("STOPPING=1")
+        self._say("STOPPING=1", PATIENCE)
 
-    def _say(self, state: str) -> None:
+    def _say(self, state: str, patience: float) -> None:
         if not self._address:
             return
         # A manager that is gone, or slow, must not stop the service.
@@ -49,5 +52,5 @@ class ServiceManager:
             contextlib.suppress(OSError),
             socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as manager,
         ):
-            manager.setblocking(False)
+            manager.settimeout(patience)
             manager.sendto(state.encode(), self._address)

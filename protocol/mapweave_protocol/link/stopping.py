@@ -23,11 +23,12 @@ def stop_on_signal() -> Callable[[], bool]:
             signal.signal(stopping, signal.SIG_DFL)
 
     def asked() -> bool:
-        if came:
+        stop = bool(came)  # once: it may come while a sign of life is given
+        if stop:
             manager.stopping()
         else:
             manager.alive()
-        return bool(came)
+        return stop
 
     for stopping in STOP_SIGNALS:
         signal.signal(stopping, note)

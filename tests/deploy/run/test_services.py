@@ -8,6 +8,8 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
+import time
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -148,3 +150,21 @@ def test_without_a_manager_nothing_is_said_and_nothing_fails() -> None:
         manager = ServiceManager(environment)
         manager.alive()
         manager.stopping()
+
+
+def test_a_manager_that_is_slow_to_read_hears_all_the_same_that_a_service_stops(
+    tmp_path: Path,
+) -> None:
+    address = tmp_path / "notify"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(address))
+        manager.settimeout(PATIENCE)
+        service = ServiceManager({"NOTIFY_SOCKET": str(address), "WATCHDOG_USEC": "0"})
+        for _ in range(100):  # more than the kernel keeps
+            service.alive()
+        stopping = threading.Thread(target=service.stopping)
+        stopping.start()
+        time.sleep(0.1)
+        while manager.recv(100) != b"STOPPING=1":
+            pass
+        stopping.join()
