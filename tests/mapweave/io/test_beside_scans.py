@@ -64,6 +64,25 @@ def test_a_laser_that_hangs_turned_is_set_right_by_the_bags_own_transforms(
         np.testing.assert_allclose(scan.ranges, np.arange(8.0, 0.0, -1.0))
 
 
+def test_a_transform_that_cannot_be_read_is_told_of_and_scans_are_read_without_it(
+    tmp_path: Path,
+) -> None:
+    warned: list[str] = []
+    with Writer2(tmp_path / "some", version=9, storage_plugin=StoragePlugin.MCAP) as recorder:
+        for topic, kind, message in [
+            ("/tf_static", TF_MESSAGE, tf(transform("base_link", "laser", 0, 0, 0.5))),
+            *said(ROS2, scans=1),
+        ]:
+            data = bytes(ROS2.serialize_cdr(message, kind))
+            half = data[: len(data) // 2] if kind == TF_MESSAGE else data
+            connection = recorder.add_connection(topic, kind, typestore=ROS2)
+            recorder.write(connection, 0, half)
+    (scan,) = read_scans(tmp_path / "some", on_warning=warned.append)
+    assert scan.angles[0] == pytest.approx(-0.4, abs=1e-6)
+    (line,) = warned
+    assert "assumed: messages of /tf_static that cannot be read say nothing" in line
+
+
 def test_transforms_that_come_last_count_as_well_and_those_of_others_do_not(
     tmp_path: Path,
 ) -> None:

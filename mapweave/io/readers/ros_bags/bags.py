@@ -203,7 +203,7 @@ def read_open_bag(path: Path, bag: Bag, options: ReadOptions) -> Iterator[Scan]:
     tally = Tally("message", EXPECTED, cut_off=bag.cut_off)
     decoder = LaserDecoder()
     topic = choose_topic(path, bag, options.topic)
-    beside = BesideScans.of(path, partial(_whole_of_type, bag), decoder, options)
+    beside = BesideScans.of(path, partial(_whole_of_type, bag), decoder, options, tally.assume)
     try:
         for message in _sound(bag.scans(topic), tally):
             tally.pieces += 1

@@ -1,10 +1,10 @@
 """What a bag says beside its scans: where the laser sits, and the robot's odometry."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from mapweave.errors import FileError
 from mapweave.geometry import se2
@@ -49,7 +49,12 @@ class BesideScans:
 
     @classmethod
     def of(
-        cls, path: Path, of_type: OfType, decoder: LaserDecoder, options: ReadOptions
+        cls,
+        path: Path,
+        of_type: OfType,
+        decoder: LaserDecoder,
+        options: ReadOptions,
+        assume: Callable[[str], None],
     ) -> "BesideScans":
         """Read it, all at once.
 
@@ -57,6 +62,8 @@ class BesideScans:
         ----------
         of_type
             As of a bag.
+        assume
+            Told what had to be assumed, such as that a message that cannot be read says nothing.
 
         Raises
         ------
@@ -65,11 +72,9 @@ class BesideScans:
         """
         frames = StaticFrames()
         for message in of_type(TF_MESSAGE, TF_STATIC):
-            try:
-                frames.add(decoder.decode(message, TF_MESSAGE))
-            except UnreadableMessageError:
-                continue  # a transform less; scans are what is counted
-        return cls(path, frames, _odometry(path, of_type, decoder, options))
+            if (decoded := _decoded(message, TF_MESSAGE, decoder, assume)) is not None:
+                frames.add(decoded)
+        return cls(path, frames, _odometry(path, of_type, decoder, options, assume))
 
     def completed(self, frame: str, scan: Scan) -> Scan:
         """Return `scan`, taken in `frame`, as the robot has it, with the odometry of its moment."""
@@ -88,7 +93,11 @@ class BesideScans:
 
 
 def _odometry(
-    path: Path, of_type: OfType, decoder: LaserDecoder, options: ReadOptions
+    path: Path,
+    of_type: OfType,
+    decoder: LaserDecoder,
+    options: ReadOptions,
+    assume: Callable[[str], None],
 ) -> OdometryTrack | None:
     """Return the odometry that is asked for; None where none is."""
     asked = options.odometry_topic
@@ -100,7 +109,9 @@ def _odometry(
     for message in of_type(kind):
         topics[message.topic] += 1
         if asked is None or message.topic.strip("/") == asked.strip("/"):
-            _take(track, message, kind, decoder)
+            decoded = _decoded(message, kind, decoder, assume)
+            for stamp, pose in () if decoded is None else odometry_in(decoded):
+                track.add(stamp, pose)
     listed = ", ".join(f"{topic} ({count})" for topic, count in sorted(topics.items())) or "none"
     if asked is None and len(topics) > 1:
         raise FileError(path, f"has odometry at {listed}; name one with --odometry TOPIC")
@@ -111,10 +122,12 @@ def _odometry(
     return track
 
 
-def _take(track: OdometryTrack, message: Message, kind: str, decoder: LaserDecoder) -> None:
+def _decoded(
+    message: Message, kind: str, decoder: LaserDecoder, assume: Callable[[str], None]
+) -> Any | None:  # noqa: ANN401 - made from its definition
+    """Return what `message` says; None, and `assume` is told, where it cannot be read."""
     try:
-        decoded = decoder.decode(message, kind)
+        return decoder.decode(message, kind)
     except UnreadableMessageError:
-        return
-    for stamp, pose in odometry_in(decoded):
-        track.add(stamp, pose)
+        assume(f"messages of {message.topic} that cannot be read say nothing")
+        return None
