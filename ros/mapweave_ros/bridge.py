@@ -1,6 +1,7 @@
-"""``mapweave bridge``: a team's joint map and poses, on a ROS 2 network."""
+"""``mapweave bridge``: a team's joint map and poses, on a ROS 2 network or in Foxglove."""
 
 import argparse
+import logging
 import threading
 from collections.abc import Callable, Iterator, Sequence
 
@@ -12,11 +13,15 @@ from mapweave_protocol.link.stopping import stop_on_signal
 from mapweave_protocol.link.subscriber import joint_maps, poses
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 from mapweave_protocol.wire.messages import PoseMessage
+from mapweave_ros.foxglove_live import SCHEME as FOXGLOVE
+from mapweave_ros.foxglove_live import FoxgloveOutput
 from mapweave_ros.network import Ros2Network
 from mapweave_ros.output import Ros2Output
 
 POLL = 0.1  # [s] after which a signal is noticed
 FAREWELL = 2.0  # [s] for a session to be closed
+
+_log = logging.getLogger(__name__)
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
@@ -25,27 +30,39 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to",
         default="ros2:",
-        metavar="NETWORK",
+        metavar="WHERE",
         help="where ROS 2 is, such as 'ros2:?connect=tcp/127.0.0.1:7447&domain=0' (default ros2:,"
-        " the team's network, $ROS_DOMAIN_ID or 0); distro=humble for that release",
+        " the team's network, $ROS_DOMAIN_ID or 0), distro=humble for that release; or"
+        " foxglove:8765, a port of this machine for Foxglove",
     )
 
 
 def _run(options: argparse.Namespace) -> int:
     begin_log(options, "bridge")
     team, endpoints, link = connection_of(options)
-    network = Ros2Network.parse(options.to, endpoints)
-    stopping = stop_on_signal()
-    with Ros2Output.of_team(network, team) as output:
-        _Following(team, endpoints, link, output).run(stopping)
+    with _output(options.to, team, endpoints) as output:
+        _Following(team, endpoints, link, output).run(stop_on_signal())
     return 0
+
+
+def _output(word: str, team: str, endpoints: Sequence[str]) -> Ros2Output | FoxgloveOutput:
+    """Return the output that `word` names."""
+    if not word.startswith(FOXGLOVE):
+        return Ros2Output.of_team(Ros2Network.parse(word, endpoints), team)
+    output = FoxgloveOutput.parse(word)
+    _log.info("open %s in Foxglove (Foxglove WebSocket)", output.url)
+    return output
 
 
 class _Following:
     """Leaves what a team says at an output, each kind from a thread of its own."""
 
     def __init__(
-        self, team: str, endpoints: Sequence[str], link: LinkSettings, output: Ros2Output
+        self,
+        team: str,
+        endpoints: Sequence[str],
+        link: LinkSettings,
+        output: Ros2Output | FoxgloveOutput,
     ) -> None:
         self._team = team
         self._from = {"connect": endpoints, "link": link}
@@ -86,7 +103,7 @@ class _Following:
 
 
 command = Command(
-    "Show a team's joint map and poses on a ROS 2 network.",
+    "Show a team's joint map and poses on a ROS 2 network, or in Foxglove.",
     _configure,
     _run,
     "--team rescue --to 'ros2:?connect=tcp/localhost:7447'",
