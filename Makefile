@@ -19,10 +19,12 @@ $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "mapweave needs Python 3.11 or newer; name one with: make PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv --clear .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	@touch $@ $(KERNELS)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+		--config-settings=wheel.cmake=false --editable '.[dev]'
+	@touch $@
 
-# Compiled again when their sources change; where nothing can be compiled, NumPy does their work.
+# Compiled when they are needed, and when their sources change; where nothing can be compiled,
+# NumPy does their work. The checks of make test need none: its tests run the wheel.
 $(KERNELS): $(STAMP) mapweave/kernels/CMakeLists.txt $(wildcard mapweave/kernels/*.[ch]pp)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
@@ -30,7 +32,7 @@ $(KERNELS): $(STAMP) mapweave/kernels/CMakeLists.txt $(wildcard mapweave/kernels
 demo: $(KERNELS)
 	$(BIN)/mapweave team --world office --robots 3 --output demo --http 127.0.0.1:0
 
-lint: $(KERNELS)
+lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -38,11 +40,11 @@ lint: $(KERNELS)
 	$(BIN)/mypy examples/*.py
 	$(BIN)/lint-imports
 
-format: $(KERNELS)
+format: $(STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-dist/.built: $(KERNELS) $(SOURCES)
+dist/.built: $(STAMP) $(SOURCES)
 	rm -rf dist
 	$(BIN)/python -m build --quiet
 	@touch $@
@@ -53,10 +55,15 @@ wheel: dist/.built
 	$(BIN)/python -m tools.wheel_environment .venv-wheel
 	@touch $@
 
-test: lint .venv-wheel/.installed
+# Side by side, the checks and the wheel take little longer than one of them.
+CHECKED_AND_BUILT = $(MAKE) --no-print-directory --jobs=2 --output-sync lint .venv-wheel/.installed
+
+test: $(STAMP)
+	+$(CHECKED_AND_BUILT)
 	$(TEST_WHEEL) -m 'not slow'
 
-test-all: lint .venv-wheel/.installed
+test-all: $(STAMP)
+	+$(CHECKED_AND_BUILT)
 	$(TEST_WHEEL)
 
 quick: $(KERNELS)
