@@ -11,6 +11,7 @@ import numpy as np
 from mapweave.errors import MissingExtraError
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.exporters.map_server import FREE, OCCUPIED, RESOLUTION, Grid
+from mapweave.marks import PlacedMark
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -96,7 +97,12 @@ class Messages:
         )
 
     def markers(
-        self, lines: Sequence[Lines], labels: Sequence[str], frame: str, stamp: float
+        self,
+        lines: Sequence[Lines],
+        labels: Sequence[str],
+        marks: Sequence[PlacedMark],
+        frame: str,
+        stamp: float,
     ) -> bytes:
         """Return a ``MarkerArray`` that replaces the one before it.
 
@@ -106,6 +112,8 @@ class Messages:
             In `frame`.
         labels
             Robots, each shown by name where its own frame ``<robot>/base_link`` is.
+        marks
+            In `frame`, each shown by its label.
         """
         header = self._header(frame, stamp)
         markers = [self._marker(header, "", 0, LINES, action=CLEAR)]
@@ -114,6 +122,9 @@ class Messages:
             there = self._header(base_frame(robot), 0.0)  # wherever that is
             marker = self._marker(there, "robots", number, TEXT, text=robot, frame_locked=True)
             markers.append(marker)
+        for number, mark in enumerate(marks):
+            there = self._pose(np.array([*mark.position, 0.0]))
+            markers.append(self._marker(header, "marks", number, TEXT, text=mark.label, pose=there))
         return self._encode(MARKER_ARRAY, markers=markers)
 
     def transforms(self, transforms: Sequence[Transform]) -> bytes:
@@ -141,6 +152,7 @@ class Messages:
         *,
         action: int = 0,
         text: str = "",
+        pose: object = None,
         frame_locked: bool = False,
         points: Sequence[object] = (),
         colors: Sequence[object] = (),
@@ -153,7 +165,7 @@ class Messages:
             id=number,
             type=kind,
             action=action,
-            pose=self._pose(np.zeros(3)),
+            pose=pose or self._pose(np.zeros(3)),
             scale=self._make("geometry_msgs/msg/Vector3", x=width, y=width, z=width),
             color=self._colour(0.1, 0.3, 0.9),
             lifetime=self._make("builtin_interfaces/msg/Duration", sec=0, nanosec=0),

@@ -6,17 +6,26 @@ that a robot is in now, and ``<robot>/base_link`` the robot.
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from mapweave.anchors import placed_marks
 from mapweave.errors import FileError
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.io.exporters.map_server import grid_of
-from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, parse_component
+from mapweave.maps import (
+    JointComponent,
+    JointMap,
+    LineMap,
+    RobotMap,
+    component_name,
+    parse_component,
+)
+from mapweave.marks import PlacedMark
 from mapweave_protocol.wire.messages import PoseMessage
 from mapweave_ros.messages import (
     MARKER_ARRAY,
@@ -79,11 +88,13 @@ class Speaker:
         """Tell the component that a robot is in."""
         if not robot_map.submaps:
             return
-        lines = robot_map.lines(robot_map.submaps[-1].component)
+        number = robot_map.submaps[-1].component
+        lines, component = robot_map.lines(number), component_name(robot_map.robot, number)
+        marks = [mark for mark in placed_marks(robot_map) if mark.component == component]
         certain = np.ones(len(lines.segments))
         topic, frame = f"/{topic_name(robot_map.robot)}", map_frame(robot_map.robot)
         walls = Lines("walls", lines.segments, _by_confidence(certain))
-        self._tell_map(topic, frame, lines, [walls], [robot_map.robot])
+        self._tell_map(topic, frame, lines, [walls], [robot_map.robot], marks)
 
     def joint_map(self, joint: JointMap) -> None:
         """Tell the component of the most wall."""
@@ -93,7 +104,8 @@ class Speaker:
         self._frame = min(shown.robots, key=parse_component)
         walls = Lines("walls", shown.map.segments, _by_confidence(shown.segment_confidence))
         robots = sorted({parse_component(name)[0] for name in shown.robots})
-        self._tell_map("", JOINT_FRAME, shown.map, [walls, _links(joint, shown)], robots)
+        lines = [walls, _links(joint, shown)]
+        self._tell_map("", JOINT_FRAME, shown.map, lines, robots, shown.marks)
 
     def pose(self, pose: PoseMessage) -> None:
         """Tell where a robot is: in its own map, and where that is in the joint map, if shown."""
@@ -108,10 +120,16 @@ class Speaker:
         self._node.put(TF, self._messages.transforms(told))
 
     def _tell_map(
-        self, topic: str, frame: str, lines: LineMap, shown: list[Lines], robots: list[str]
+        self,
+        topic: str,
+        frame: str,
+        lines: LineMap,
+        shown: list[Lines],
+        robots: list[str],
+        marks: Sequence[PlacedMark],
     ) -> None:
         now = time.time()
-        self._node.put(f"{topic}/walls", self._messages.markers(shown, robots, frame, now))
+        self._node.put(f"{topic}/walls", self._messages.markers(shown, robots, marks, frame, now))
         if len(lines.segments) == 0:
             return
         try:

@@ -13,6 +13,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import JointComponent, JointMap, RobotMap
+from mapweave.marks import PlacedMark
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.messages import PoseMessage
 from mapweave_protocol.wire.pose_message import JointPose
@@ -190,7 +191,8 @@ def test_the_frames_of_a_team_put_each_robot_where_it_is_in_the_joint_map(
     lines = mapped.lines(0)
     confidence = np.linspace(0, 1, len(lines.segments))
     there = {"r1/0": np.zeros(3), "r2/0": np.array([4.0, 0.0, np.pi / 2])}
-    joint = JointMap(3, (JointComponent(there, 1.0, lines, confidence),), ())
+    victim = PlacedMark("m1", "victim", "r2", 1.0, "r2/0", np.array([3.0, -2.0]))
+    joint = JointMap(3, (JointComponent(there, 1.0, lines, confidence, marks=(victim,)),), ())
     at = se2.compose(there["r2/0"], np.array([1.0, 2.0, 0.5]))
     told = pose(JointPose(frame="r1/0", since=3, pose=tuple(at)))
     with (
@@ -211,6 +213,9 @@ def test_the_frames_of_a_team_put_each_robot_where_it_is_in_the_joint_map(
     (shown,) = (m for m in markers.markers if m.ns == "walls")
     assert (shown.colors[0].r, shown.colors[-1].g) == (pytest.approx(0.9), pytest.approx(0.6))
     assert shown.colors[-1].r == 0
+    (mark,) = (m for m in markers.markers if m.ns == "marks")
+    assert (mark.text, mark.header.frame_id) == ("victim", "map")
+    assert (mark.pose.position.x, mark.pose.position.y) == (3.0, -2.0)
 
 
 @pytest.mark.parametrize(
