@@ -46,6 +46,16 @@ _log = logging.getLogger(__name__)
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", required=True, metavar="ID", help="the robot's id")
+    _add_what_is_mapped(parser)
+    add_start_arguments(parser)
+    _add_what_is_told(parser)
+    _add_what_is_kept(parser)
+    add_connection_arguments(parser)
+    add_log_arguments(parser)
+    add_config_argument(parser)
+
+
+def _add_what_is_mapped(parser: argparse.ArgumentParser) -> None:
     sources = parser.add_mutually_exclusive_group(required=True)
     sources.add_argument(
         "--source",
@@ -80,7 +90,9 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="let odometry help; what was seen decides: none, prior for that of the log, a bag's"
         " topic such as /odom, or ros2:/odom or ros2:/tf where the scans are (default %(default)s)",
     )
-    add_start_arguments(parser)
+
+
+def _add_what_is_told(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map-interval",
         type=argument(positive),
@@ -94,6 +106,9 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="show the robot's map and pose on a ROS 2 network as well: ros2: for the team's, or"
         " such as 'ros2:?connect=tcp/127.0.0.1:7447&domain=0'",
     )
+
+
+def _add_what_is_kept(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--state",
         type=Path,
@@ -107,9 +122,6 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="earlier runs that ended longer ago are kept, but not sent [s] (default %(default)g)",
     )
-    add_connection_arguments(parser)
-    add_log_arguments(parser)
-    add_config_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
