@@ -207,10 +207,19 @@ export function drawCaption(context, camera, { scene, pose }, number, count) {
     context.stroke();
     context.setLineDash([]);
   }
+  const captions = captionsOf(scene, number, count);
+  context.font = `600 ${FONT}`;
+  const fits = captions.find((caption) => count === 1 || context.measureText(caption).width < right - left);
+  write(context, left + 2, top - 8, fits ?? captions.at(-1));
+}
+
+/** Return what is written above a component, the longest first: beside others it gets no wider than it. */
+function captionsOf(scene, number, count) {
   const robots = [...new Set(scene.names.map(robotOf))].join(" + ");
   const title = count > 1 ? `Component ${number} of ${count}: ${robots}` : robots;
-  const sure = scene.names.length > 1 ? `${percent(scene.confidence)} sure` : "not joined to another robot";
-  write(context, left + 2, top - 8, `${title}  ·  ${sure}`);
+  if (scene.names.length === 1) return [`${title}  ·  not joined to another robot`, `${title}  ·  not joined`, title, robots];
+  const sure = `${percent(scene.confidence)} sure`;
+  return [`${title}  ·  ${sure}`, `${robots}  ·  ${sure}`, robots, `${scene.names.length} robots`];
 }
 
 function write(context, u, v, text, align = "left") {

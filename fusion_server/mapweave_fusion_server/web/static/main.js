@@ -41,6 +41,7 @@ async function load(version) {
   state.wanted = version;
   if (state.loading) return;
   state.loading = true;
+  if (!state.joint) write(byId("headline"), "Loading the map…");
   try {
     while (state.joint?.version !== state.wanted || state.joint?.series !== timeline.series) {
       const number = state.wanted;
@@ -55,8 +56,7 @@ async function load(version) {
 }
 
 function show(joint, paths) {
-  const names = joint.components.flatMap((component) => Object.keys(component.robots));
-  setRobots([...names.map(robotOf), ...(state.team?.robots ?? []).map(({ robot }) => robot)]);
+  nameRobots();
   map.show(joint, paths, timeline.isLatest);
   byId("no-paths").hidden = paths.kept;
   const scenes = map.stage.actors.map((actor) => actor.scene);
@@ -69,8 +69,15 @@ function show(joint, paths) {
   write(byId("map-text"), `Version ${joint.version}. ${headline(scenes)}. ${scenes.map(tellScene).join(" ")}`);
   if (map.layers.parts) loadParts();
   if (state.against) compare(state.against);
+  if (state.team) showTeam(state.team); // in the colours of all there are by now
   writeLegend();
   byId("map").dataset.version = joint.version;
+}
+
+/** Give each robot of the map and of the team its colour. */
+function nameRobots() {
+  const mapped = (state.joint?.components ?? []).flatMap(({ robots }) => Object.keys(robots).map(robotOf));
+  setRobots([...mapped, ...(state.team?.robots ?? []).map(({ robot }) => robot)]);
 }
 
 function headline(scenes) {
@@ -114,6 +121,7 @@ function showTeam(report) {
   state.team = report;
   write(byId("team-name"), report.coordinator.team);
   document.title = `${report.coordinator.team} · mapweave`;
+  nameRobots();
   map.setAlive(report.robots);
   fillTeam(byId("team"), report, map.following, {
     follow: (robot) => {
