@@ -65,7 +65,7 @@ def seen_free(sights: Sights, parameters: FreeSpaceParameters) -> BaseGeometry:
     cell = max(p.cell, float(np.sqrt(np.prod(high - low) / p.max_cells)))
     rows, columns = (np.ceil((high - low) / cell).astype(np.int64) + 1).tolist()
     free = clear_cells(sights, p.margin, Grid(low, cell, rows, columns))
-    depth = max(1, round(p.min_width / 2 / cell + 0.5))  # between a cell's middle and its edge
+    depth = _depth(cell, p)
     level = max(depth - 1.0, 0.5)  # half a cell inside of where it ends
     corners, start = outlines(from_core(free, depth), level)
     found = _with_holes(np.split(low + cell * (corners - 0.5), start[1:-1]) if len(corners) else [])
@@ -74,6 +74,11 @@ def seen_free(sights: Sights, parameters: FreeSpaceParameters) -> BaseGeometry:
     simpler = shapely.simplify(found, left, preserve_topology=False)
     whole = shapely.union_all(shapely.make_valid(simpler))
     return MultiPolygon([q for q in _polygons(whole) if q.area >= p.min_area])
+
+
+def _depth(cell: float, p: FreeSpaceParameters) -> int:
+    """Return half the least width, in cells between one's middle and another's edge."""
+    return max(1, round(p.min_width / 2 / cell + 0.5))
 
 
 def _seen_bounds(sights: Sights, margin: float) -> tuple[FloatArray, FloatArray] | None:
@@ -122,7 +127,7 @@ def unite(pieces: Sequence[FloatArray], parameters: FreeSpaceParameters) -> Base
     if rows * columns > p.max_cells:
         return _opened(from_rings(pieces), p)
     grid = Grid(low, p.cell, rows, columns)
-    return _opened(_outlined(filled_cells(pieces, *grid), grid), p)
+    return _opened_cells(filled_cells(pieces, *grid), grid, p)
 
 
 def free_cells(free: BoolArray, cell: float, parameters: FreeSpaceParameters) -> BaseGeometry:
@@ -134,8 +139,14 @@ def free_cells(free: BoolArray, cell: float, parameters: FreeSpaceParameters) ->
         [m]; the first cell of the first row has its corner at the origin, and rows go along y.
     """
     along_x: BoolArray = np.ascontiguousarray(free.T)
-    grid = Grid(np.zeros(2), cell, *along_x.shape)
-    return _opened(_outlined(along_x, grid), parameters)
+    return _opened_cells(along_x, Grid(np.zeros(2), cell, *along_x.shape), parameters)
+
+
+def _opened_cells(free: BoolArray, grid: Grid, p: FreeSpaceParameters) -> BaseGeometry:
+    """Return what the cells that are `free` cover, its outline simplified, streaks left out."""
+    depth = _depth(grid.cell, p)
+    wide: BoolArray = from_core(free.view(np.uint8), depth)[1:-1, 1:-1] < depth
+    return _without_crumbs(_outlined(wide, grid), p)
 
 
 def _outlined(free: BoolArray, grid: Grid) -> BaseGeometry:
@@ -150,12 +161,17 @@ def _outlined(free: BoolArray, grid: Grid) -> BaseGeometry:
 
 
 def _opened(free: BaseGeometry, p: FreeSpaceParameters) -> BaseGeometry:
-    """Return what is `free`, its outline simplified, streaks and crumbs left out."""
-    # Opened: a view through a crack clears nothing that would matter, and costs many vertices.
+    """Return what of `free` is wide enough, its outline simplified."""
+    # A view through a crack clears nothing that would matter, and costs many vertices. Corners
+    # become round: where free space tapers a mitre goes on to a tip that nobody saw.
     width = p.min_width / 2
-    with np.errstate(invalid="ignore", divide="ignore"):  # GEOS mitres corners of no width at all
-        opened = free.buffer(-width, join_style="mitre").buffer(width, join_style="mitre")
-    simpler = shapely.simplify(opened, p.simplification)
+    opened = free.buffer(-width, quad_segs=4).buffer(width, quad_segs=4)
+    return _without_crumbs(opened, p)
+
+
+def _without_crumbs(free: BaseGeometry, p: FreeSpaceParameters) -> BaseGeometry:
+    """Return `free`, its outline simplified, without what is not worth sending."""
+    simpler = shapely.simplify(free, p.simplification)
     return MultiPolygon([q for q in _polygons(simpler) if q.area >= p.min_area])
 
 

@@ -27,10 +27,12 @@ def straightened(
     tuple of tuple of IntArray
         Of each area the outside, then its holes, each (k, 2).
     """
+    area = from_rings(outlines)
     # GEOS divides by nothing at some corners of a mitre, and goes on with what is right.
     with np.errstate(invalid="ignore", divide="ignore"):
-        deep = shapely.buffer(from_rings(outlines), -depth, join_style="mitre")
-        wide = shapely.buffer(deep, depth, join_style="mitre", mitre_limit=2.0)
+        deep = shapely.buffer(area, -depth, join_style="mitre")
+        sharp = shapely.buffer(deep, depth, join_style="mitre", mitre_limit=2.0)
+    wide = shapely.intersection(sharp, area)  # where it tapers, a mitre goes beyond it
     simple = shapely.simplify(wide, deviation)
     whole = shapely.simplify(shapely.set_precision(simple, 1.0), 0.0)
     areas = [p for p in shapely.get_parts(whole) if isinstance(p, Polygon) and not p.is_empty]
