@@ -1,5 +1,7 @@
 """Free space never reaches beyond what was seen: after no step, whatever the room and the view."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import shapely
@@ -43,7 +45,7 @@ def covered(scan: Scan, pose: FloatArray) -> BaseGeometry:
     reach = np.minimum(np.nan_to_num(scan.ranges, nan=0.0), P.sight)
     ends = reach[:, None] * np.column_stack([np.cos(scan.angles), np.sin(scan.angles)])
     at = se2.transform_points(pose, ends)
-    fan = [Polygon([pose[:2], a, b]) for a, b in zip(at[:-1], at[1:], strict=True)]
+    fan = [Polygon([pose[:2], a, b]) for a, b in pairwise(at)]
     return shapely.union_all(shapely.make_valid(fan))
 
 
@@ -104,8 +106,9 @@ def test_a_wedge_ends_where_it_gets_narrow(turn: float, max_cells: int) -> None:
 
 def test_a_wedge_of_a_grid_ends_where_it_gets_narrow() -> None:
     centres = (np.indices((60, 110)) + 0.5) * P.cell
-    free = shapely.contains_xy(Polygon(WEDGE + [0, 1.5]), centres[1], centres[0])
-    assert beyond(free_cells(free, P.cell, P), Polygon(WEDGE + [0, 1.5])) <= P.cell
+    wedge = shapely.affinity.translate(Polygon(WEDGE), 0.0, 1.5)
+    free = shapely.contains_xy(wedge, centres[1], centres[0])
+    assert beyond(free_cells(free, P.cell, P), wedge) <= P.cell
 
 
 @pytest.mark.parametrize("half_width", [0.1, 0.25, 0.35])
