@@ -75,3 +75,11 @@ def player(sensor: Sensor, pose: bool = False) -> str:
         head = f"{device} laser 00 001 {kind} {k}{where} {low:.6f} {high:.6f} {step:.8f} 30.0"
         lines.append(f"{head} {sensor.beams} {pairs}\n")
     return "".join(lines)
+
+
+def dpslam(sensor: Sensor) -> str:
+    """Return a log as DP-SLAM writes them: where the odometry was before each scan, no times."""
+    return "".join(
+        f"Odometry {k / 4} -0.5 0.25\nLaser {sensor.beams} {text} \n"
+        for k, (_, text) in enumerate(readings(sensor))
+    )

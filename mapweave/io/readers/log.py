@@ -18,8 +18,8 @@ from mapweave.io.readers.tally import Tally
 from mapweave.scan.scan import Scan
 
 EXPECTED = (
-    "expected a CARMEN, TORO or g2o log with FLASER or ROBOTLASER1 lines, or Player's; plain, gzip"
-    " or zip"
+    "expected a CARMEN, TORO or g2o log with FLASER or ROBOTLASER1 lines, Player's, or DP-SLAM's;"
+    " plain, gzip or zip"
 )
 
 

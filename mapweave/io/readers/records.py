@@ -1,4 +1,4 @@
-"""The two kinds of CARMEN's lines that hold a scan: ``FLASER`` and ``ROBOTLASER1``.
+"""The kinds of lines that hold a scan: CARMEN's ``FLASER`` and ``ROBOTLASER1``, DP-SLAM's.
 
 ::
 
@@ -7,6 +7,8 @@
     ROBOTLASER1 type start_angle field_of_view resolution maximum_range accuracy remission_mode
         n r1…rn m s1…sm  laser_x laser_y laser_theta  robot_x robot_y robot_theta
         tv rv forward_safety side_safety turn_axis  ipc_timestamp host logger_timestamp
+    Odometry x y theta
+    Laser n r1…rn
 """
 
 import math
@@ -121,6 +123,37 @@ def parse_robotlaser(words: list[bytes]) -> LaserRecord:
         laser_pose=poses[:3],
         robot_pose=poses[3:],
         stamp=parse_stamp(words[tail + 11]),
+        assumed=beams.assumed,
+    )
+
+
+def parse_laser(
+    words: list[bytes], beams_of: Callable[[int], Beams], robot_pose: FloatArray
+) -> LaserRecord:
+    """Return what the words of a ``Laser`` of DP-SLAM's logs say; no time, and no pose.
+
+    Parameters
+    ----------
+    words, beams_of
+        As `parse_flaser` takes them.
+    robot_pose
+        (3,) of the ``Odometry`` before it [m, m, rad].
+
+    Raises
+    ------
+    DamagedLineError
+        If a word is missing, left over, or not the number it should be.
+    """
+    count = parse_count(words, 1, "beams")
+    check_length(words, (2 + count,))
+    beams = beams_of(count)
+    readings = beams.ascending(parse_numbers(words[2:]))
+    return LaserRecord(
+        angles=beams.angles,
+        ranges=without_no_returns(readings, FARTHEST_READING),
+        laser_pose=np.full(3, np.nan),
+        robot_pose=robot_pose,
+        stamp=math.nan,
         assumed=beams.assumed,
     )
 

@@ -29,6 +29,7 @@ UNTIMED = {
     "361 beams": dialects.flaser(Sensor(-90, 0.5, 361), times=NO_TIMES),
     "another sensor's": dialects.flaser(Sensor(-135, 0.5, 541), times=NO_TIMES),
     "240° as stated": dialects.flaser(Sensor(-120, 0.5, 481), f"{FOV} 240\n", NO_TIMES),
+    "DP-SLAM's": dialects.dpslam(Sensor(-90, 1, 181)),
     "other ends of lines": dialects.flaser(Sensor(-90, 1, 181), "# a\n\n", " \t\r"),
 }
 OTHER_SCANNERS = {

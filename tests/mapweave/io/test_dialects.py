@@ -277,6 +277,30 @@ def test_a_damaged_line_of_a_player_log_is_told(tmp_path: Path) -> None:
     assert "dropped 1 damaged line, the first line 25: laser has" in said
 
 
+def test_a_log_of_dpslam_has_its_odometry_before_each_scan_and_no_times(tmp_path: Path) -> None:
+    sensor = Sensor(-90, 1, 181)
+    scans, (said,) = read(tmp_path, dialects.dpslam(sensor), odometry=True)
+    stated, _ = read(tmp_path, dialects.robotlaser(sensor))
+    assert said.endswith("assumed: scans follow each other evenly, as they have no stamps")
+    for k, (scan, other) in enumerate(zip(scans, stated, strict=True)):
+        np.testing.assert_allclose(scan.angles, other.angles, atol=1e-5)
+        np.testing.assert_array_equal(scan.ranges, other.ranges)
+        np.testing.assert_array_equal(scan.odometry, [k / 4, -0.5, 0.25])
+        assert math.isnan(scan.stamp)
+
+
+@pytest.mark.parametrize("odometry", ["", "Odometry\n", "Odometry 1 2 x\n", "Odometry 1 2\n"])
+def test_a_log_of_dpslam_without_sound_odometry_has_none(odometry: str, tmp_path: Path) -> None:
+    (scan,), _ = read(tmp_path, f"{odometry}Laser 3 1 2 3\n", odometry=True)
+    assert scan.odometry is None and scan.ranges.tolist() == [1, 2, 3]
+
+
+def test_a_scan_of_dpslam_that_is_cut_off_is_told(tmp_path: Path) -> None:
+    scans, (said,) = read(tmp_path, "Laser 3 1 2 3\nLaser 3 1 2\nLaser\nLaser on\n")
+    assert len(scans) == 1
+    assert "dropped 1 damaged line, the first line 2: Laser has 4 words, expected 5" in said
+
+
 SENSOR = Sensor(-135, 45, 7)
 LOGS = [
     dialects.robotlaser(SENSOR),
@@ -285,6 +309,7 @@ LOGS = [
     dialects.flaser(SENSOR, f"{FOV} 270\n{RESOLUTION} 45\n", NO_TIMES),
     dialects.flaser(SENSOR, f"{FOV} 4.7\n", TIMES),
     dialects.player(SENSOR),
+    dialects.dpslam(SENSOR),
 ]
 WORDS = st.sampled_from(
     ["", " ", "\n", "0", "-1", "nan", "inf", "-inf", "1e999", "1e-320", "360", "541", "9" * 30,

@@ -81,6 +81,25 @@ def test_plain_pictures_and_other_depths_are_read(tmp_path: Path) -> None:
     assert found(path) == ["#.?"]
 
 
+@pytest.mark.parametrize("most", [1, 15, 100, 254, 256, 1000, 65535])
+@pytest.mark.parametrize("plain", [True, False])
+def test_the_greatest_value_of_a_pgm_is_white_whatever_it_is(
+    most: int, plain: bool, tmp_path: Path
+) -> None:
+    """As map_server has it: a pixel's shade is its value as a share of what the picture states."""
+    path = grid(tmp_path, "mode: scale\noccupied_thresh: 0.65\nfree_thresh: 0.25\n")
+    values = [0, most // 3, most // 2, most - most // 5, most]
+    data = (
+        " ".join(map(str, values)).encode()
+        if plain
+        else np.array(values, dtype=np.uint8 if most < 256 else ">u2").tobytes()
+    )
+    head = f"P{2 if plain else 5}\n5 1\n{most}\n".encode()
+    (tmp_path / "map.pgm").write_bytes(head + data)
+    expected = ["#" if v / most < 0.35 else "." if v / most > 0.75 else "?" for v in values]
+    assert found(path) == ["".join(expected)]
+
+
 def test_the_frame_is_that_of_the_settings(tmp_path: Path) -> None:
     cells = read_grid(grid(tmp_path, ""))
     assert cells.resolution == 0.1
