@@ -57,7 +57,7 @@ class FusionParameters(StageParameters):
     # Right transforms contradict next to nothing, wrong ones a metre in ten: at a weight of 5 the
     # right one scored highest for every pair of stretches with 10 m and more in common.
     verification: VerificationParameters = derived(
-        lambda c: VerificationParameters.of(c, contradiction_weight=5.0)
+        lambda c: VerificationParameters.of(c, contradiction_weight=5.0, moved_weight=0.1)
     )
     icp: IcpParameters = derived(
         lambda c: IcpParameters.of(

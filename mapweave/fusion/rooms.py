@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.extent import longer_sides
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import VerificationParameters, coinciding
 
@@ -80,7 +81,9 @@ def outside(
     told = [metres for metres in both if metres is not None]
     if not told:
         shared = coinciding(reference, other, transform, verification)
-        return 0.0 if _longer_side(other.oriented.points[shared]) <= p.max_extent else math.inf
+        points = other.oriented.points[shared]
+        extent = longer_sides(points, np.zeros(len(points), dtype=np.int64), 1)[0]
+        return 0.0 if extent <= p.max_extent else math.inf
     return math.inf if math.inf in told else min(told)
 
 
@@ -115,16 +118,6 @@ def _telling(normals: FloatArray, weight: FloatArray, p: RoomParameters) -> floa
     """[m] of wall, no more than `one_way` times what holds the weakest direction of it."""
     held = np.linalg.eigvalsh((normals * weight[:, None]).T @ normals)[0]
     return float(min(weight.sum(), p.one_way * max(held, 0.0)))
-
-
-def _longer_side(points: FloatArray) -> float:
-    """Return the longer side [m] of the least rectangle, in steps of 3°, that holds (n, 2)."""
-    if len(points) == 0:
-        return 0.0
-    turn = np.arange(0.0, np.pi / 2, np.radians(3.0))
-    axes = np.stack([np.cos(turn), np.sin(turn), -np.sin(turn), np.cos(turn)])
-    sides = np.ptp(points @ axes.reshape(2, 2, -1).transpose(2, 1, 0), axis=1)
-    return float(sides[np.argmin(sides.prod(axis=1))].max())
 
 
 def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArray]:

@@ -64,6 +64,8 @@ class DistanceField:
         (rows, columns) [m] from the edge of the seen free space inwards; 0 outside of it.
     codes
         (rows, columns) what cells say, by the limits that it hangs on; filled by what asks for it.
+    things
+        (n,) which samples are of what may have been moved, by its limits; filled in the same way.
     """
 
     oriented: OrientedPoints
@@ -75,6 +77,9 @@ class DistanceField:
     distance: Float32Array
     depth: Float32Array
     codes: dict[tuple[float, float], Int32Array] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    things: dict[tuple[float, float], BoolArray] = field(
         default_factory=dict, init=False, repr=False
     )
 

@@ -16,6 +16,7 @@ from mapweave.kernels.matching.judging import judge_samples
 from mapweave.kernels.scores import look_up_scores
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
+from mapweave.matching.free_standing import free_standing
 from mapweave.parameters import StageParameters, derived
 from mapweave.shape.tangent_space import complexities
 
@@ -44,6 +45,15 @@ class VerificationParameters(StageParameters):
     contradiction_weight: float = Field(
         1.0, gt=0, description="metres in common that a metre contradicted outweighs"
     )
+    moved_weight: float = Field(
+        1.0, gt=0, le=1, description="metres contradicted that a metre of what may be moved counts"
+    )
+    moved_gap: float = Field(
+        0.3, gt=0, description="[m] to all other wall, that what may be moved keeps at least"
+    )
+    moved_side: float = Field(
+        1.1, gt=0, description="[m] of the longer side of what may be moved, between samples"
+    )
     shared_part: float = Field(
         0.5, gt=0, le=1, description="share of a segment that coincides, to count as shared"
     )
@@ -58,7 +68,7 @@ class Verdict:
     common
         [m] of wall in both maps: the smaller of the two counts.
     contradicted
-        [m] of wall, of both maps, that the other saw through.
+        [m] of wall, of both maps, that the other saw through; what may have been moved counts less.
     overlap
         Share of the wall of either map that lies where the other looked and that coincides.
     residual
@@ -120,18 +130,17 @@ def _coarse_one_way(
     weight = other.weight[::stride] * (other.weight.sum() / other.weight[::stride].sum())
     points = other.oriented.points[::stride] / reference.cell
     facing = _directions(other.oriented.normals[::stride])
+    samples = np.column_stack([points, facing]).astype(np.float32)
     angle = transforms[:, 2].astype(np.float32)
     shift = (transforms[:, :2] - reference.origin) / reference.cell
     turn = angle * np.float32(DIRECTIONS / (2 * np.pi))
     motions = np.column_stack([np.cos(angle), np.sin(angle), shift.astype(np.float32), turn])
-    return look_up_scores(
-        np.column_stack([points, facing]).astype(np.float32),
-        weight,
-        motions,
-        _codes(reference, p),
-        _worth(p),
-        DIRECTIONS,
-    )
+    codes, missing = _codes(reference, p), _worth_of_missing(other, p)[::stride]
+    scores = np.zeros(len(transforms))
+    for each in np.unique(missing):
+        some, worth = missing == each, _worth(p, float(each))
+        scores += look_up_scores(samples[some], weight[some], motions, codes, worth, DIRECTIONS)
+    return scores
 
 
 def _directions(normals: FloatArray) -> FloatArray:
@@ -158,12 +167,15 @@ def _coded(raster: DistanceField, closeness: float, clearance: float) -> Int32Ar
     return row * np.int32(DIRECTIONS)
 
 
-def _worth(p: VerificationParameters) -> Float32Array:
-    """What a metre of wall counts, by the cell's code and the wall's direction, flat."""
+def _worth(p: VerificationParameters, missing: float = 1.0) -> Float32Array:
+    """What a metre of wall counts, by the cell's code and the wall's direction, flat.
+
+    Where it is `missing`, so many metres of what it contradicts.
+    """
     turn = 2 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
     worth: Float32Array = np.zeros((SEEN_THROUGH + 1, DIRECTIONS), dtype=np.float32)
     worth[:DIRECTIONS] = np.cos(turn[:, None] - turn) > p.min_cosine
-    worth[SEEN_THROUGH] = -p.contradiction_weight
+    worth[SEEN_THROUGH] = -p.contradiction_weight * missing
     return worth.ravel()
 
 
@@ -246,8 +258,16 @@ def _one_way(
         contradicts,
         distance[coincides].astype(np.float64),
         float(other.weight[coincides].sum()),
-        float(other.weight[contradicts].sum()),
+        float((other.weight * _worth_of_missing(other, p))[contradicts].sum()),
     )
+
+
+def _worth_of_missing(other: DistanceField, p: VerificationParameters) -> FloatArray:
+    """(n,) what a metre of wall counts that is not there: a wall that is gone, in full."""
+    if p.moved_weight == 1:
+        return np.ones(len(other.weight))
+    moved = free_standing(other, p.moved_gap, p.moved_side)
+    return np.where(moved, p.moved_weight, 1.0)
 
 
 def _held(other: DistanceField, coincides: BoolArray) -> float:
