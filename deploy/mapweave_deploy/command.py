@@ -138,7 +138,9 @@ def _plan(options: argparse.Namespace, folder: Folder, store: Path, states: Path
 
 def _members(options: argparse.Namespace, folder: Folder) -> list[Member]:
     if options.world is not None:
-        return simulated_team(options.world, options.robots, options.seed, folder.scans)
+        return simulated_team(
+            options.world, options.robots, options.seed, folder.scans, options.lidar
+        )
     return team_from_logs(options.logs, options.robots)
 
 

@@ -5,7 +5,8 @@ import re
 from pathlib import Path
 
 from mapweave.cli import add_config_argument, argument, positive
-from mapweave_deploy.sim.simulation import BUILDERS
+from mapweave_deploy.sim.lidars import LIDARS
+from mapweave_deploy.sim.settings import SETTINGS
 from mapweave_fusion_server.web.address import loopback_address
 from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import MAX_PORT
@@ -25,6 +26,8 @@ def check_source(options: argparse.Namespace) -> None:
     """End with a message on usage unless there is exactly one kind of source."""
     if bool(options.logs) == (options.world is not None):
         options.wrong_usage("expected either logs or --world")
+    if options.lidar and options.world is None:
+        options.wrong_usage("--lidar is of simulated robots: expected --world")
 
 
 def _add_source(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +40,16 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
         " different buildings",
     )
     parser.add_argument(
-        "--world", choices=sorted(BUILDERS), help="a simulated place instead of logs"
+        "--world",
+        choices=sorted(SETTINGS),
+        help="a simulated place instead of logs: "
+        + "; ".join(f"{name}, {setting.about}" for name, setting in sorted(SETTINGS.items())),
+    )
+    parser.add_argument(
+        "--lidar",
+        choices=sorted(LIDARS),
+        help="of simulated robots: its field of view, range, rate and noise, and which way round it"
+        " turns; mirrored hangs upside down, and nobody says so (default: that of the world)",
     )
     parser.add_argument(
         "--seed",

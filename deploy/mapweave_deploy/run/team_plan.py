@@ -39,9 +39,11 @@ class Member:
     truth_pose: FloatArray
 
 
-def simulated_team(world: str, robots: int, seed: int, folder: Path) -> list[Member]:
+def simulated_team(
+    world: str, robots: int, seed: int, folder: Path, lidar: str | None = None
+) -> list[Member]:
     """Return a team in a built-in world, its logs written into `folder`."""
-    return [_simulated(world, log) for log in simulate(world, robots, seed, folder)]
+    return [_simulated(world, log) for log in simulate(world, robots, seed, folder, lidar)]
 
 
 def _simulated(world: str, log: RobotLog) -> Member:

@@ -4,14 +4,18 @@ Modelled on the Hokuyo UTM-30LX with its steps grouped by three: 270° in 361 be
 30 m. A whole scan is taken at one instant; the robot's motion during a sweep is not simulated.
 """
 
-from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray
+from mapweave_deploy.sim.effects.panes import NO_WALL, look
+from mapweave_deploy.sim.effects.rays import Hits, cast_rays
 from mapweave_deploy.sim.world import World
+
+Order = Literal["counter-clockwise", "clockwise", "mirrored"]
 
 
 class LidarParameters(BaseModel):
@@ -28,6 +32,7 @@ class LidarParameters(BaseModel):
     grazing: float = Field(np.radians(3.0), ge=0)  # [rad], below this angle nothing comes back
     mixed: float = Field(0.15, ge=0, le=1)  # share of the readings at an edge that mix two surfaces
     edge: float = Field(0.3, gt=0)  # [m], a jump between neighbouring beams that makes an edge
+    order: Order = "counter-clockwise"  # of readings; mirrored: upside down, and nobody says so
 
     @property
     def angles(self) -> FloatArray:
@@ -35,62 +40,34 @@ class LidarParameters(BaseModel):
         return np.linspace(-self.field_of_view / 2, self.field_of_view / 2, self.beams)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Hits:
-    """What each ray meets first.
-
-    Attributes
-    ----------
-    range
-        (n,) distance [m]; infinite where a ray meets nothing.
-    wall
-        (n,) row of the segment met; meaningless where it meets nothing.
-    grazing
-        (n,) angle between ray and surface [rad], 0 to pi/2.
-    """
-
-    range: FloatArray
-    wall: IntArray
-    grazing: FloatArray
-
-
-def cast_rays(walls: FloatArray, origin: FloatArray, directions: FloatArray) -> Hits:
-    """Return what rays from `origin` (2,) in `directions` (n,) [rad] meet among `walls` (m, 4).
-
-    Only the visible side of a wall, its left, is ever met. The ray ``o + r d`` and the segment
-    ``a + u (b - a)`` meet where ``r = cross(a - o, b - a) / cross(d, b - a)`` and
-    ``u = cross(a - o, d) / cross(d, b - a)``; seen from the left both divisors are positive.
-    """
-    start, along = walls[:, :2] - origin, walls[:, 2:] - walls[:, :2]
-    offset = start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]
-    facing = np.flatnonzero(offset > 0)
-    if len(facing) == 0:
-        nothing = np.zeros(len(directions), dtype=np.int64)
-        return Hits(np.full(len(directions), np.inf), nothing, np.zeros(len(directions)))
-    start, along, offset = start[facing], along[facing], offset[facing]
-    c, s = np.cos(directions), np.sin(directions)
-    sine = np.outer(c, along[:, 1]) - np.outer(s, along[:, 0])
-    share = np.outer(s, start[:, 0]) - np.outer(c, start[:, 1])
-    met = (sine > 0) & (share >= 0) & (share <= sine)
-    distance = np.divide(offset[None], sine, out=np.full(sine.shape, np.inf), where=met)
-    first = np.argmin(distance, axis=1)
-    rows = np.arange(len(directions))
-    slope = sine[rows, first] / np.linalg.norm(along, axis=1)[first]
-    return Hits(distance[rows, first], facing[first], np.arcsin(np.clip(slope, 0.0, 1.0)))
-
-
 def measure(
     world: World, pose: FloatArray, parameters: LidarParameters, rng: Generator
 ) -> FloatArray:
     """Return the ranges (beams,) [m] seen from `pose` (3,); the maximum: nothing came back."""
-    hits = cast_rays(world.walls, pose[:2], pose[2] + parameters.angles)
+    hits = _hits(world, pose, parameters, rng)
     ranges = _mix_edges(hits.range, parameters, rng)
     ranges = ranges + rng.normal(0.0, parameters.noise, size=len(ranges))
     lost = rng.random(len(ranges)) < parameters.dropout
-    lost |= world.dark[hits.wall] & (rng.random(len(ranges)) > parameters.dark_return)
+    dark = np.append(world.dark, False)[hits.wall]  # the last is for what is no wall
+    lost |= dark & (rng.random(len(ranges)) > parameters.dark_return)
     lost |= hits.grazing < parameters.grazing
     lost |= ~(ranges < parameters.maximum_range)
     return np.where(lost, parameters.maximum_range, np.maximum(ranges, 0.02))
+
+
+def _hits(world: World, pose: FloatArray, parameters: LidarParameters, rng: Generator) -> Hits:
+    """Return what the beams meet first: walls, panes, or the floor."""
+    directions = pose[2] + parameters.angles
+    if len(world.glass) or len(world.mirrors):
+        hits = look(world.walls, world.glass, world.mirrors, pose[:2], directions, rng)
+    else:
+        hits = cast_rays(world.walls, pose[:2], directions)
+    if world.terrain.is_level:
+        return hits
+    floor = world.terrain.floor_ranges(pose, directions, parameters.maximum_range)
+    below = floor < hits.range
+    wall = np.where(below, NO_WALL, hits.wall)
+    return Hits(np.minimum(floor, hits.range), wall, np.where(below, np.pi / 2, hits.grazing))
 
 
 def _mix_edges(ranges: FloatArray, parameters: LidarParameters, rng: Generator) -> FloatArray:

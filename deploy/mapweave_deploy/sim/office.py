@@ -4,7 +4,7 @@ The plan is fixed; the seed moves doors, furniture and what stands in the corrid
 offices are there on purpose: a joint map of this building must not mistake one for another.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -48,6 +48,17 @@ class Room:
             return box(x, (self.y2 if side == "n" else self.y1), DOOR_WIDTH, reach)
         return box((self.x2 if side == "e" else self.x1), y, reach, DOOR_WIDTH)
 
+    def leaf(self, side: str, along: float) -> tuple[float, float, float, float]:
+        """Return its leaf, shut: hinge x, y and other end x, y [m]; it opens into the room."""
+        west, south, east, north = self.door(side, along).bounds
+        x, y = (west + east) / 2, (south + north) / 2
+        return {
+            "n": (east, y, west, y),
+            "s": (west, y, east, y),
+            "e": (x, south, x, north),
+            "w": (x, north, x, south),
+        }[side]
+
 
 CORRIDORS = (
     Room("corridor", 0.30, 6.20, 29.70, 8.20, ()),
@@ -85,18 +96,20 @@ GLASS = shapely.union_all(
 )
 
 
-def office(seed: int) -> World:
-    """Return the office, furnished by `seed`."""
+def office(seed: int, visit: int | None = None) -> World:
+    """Return the office, furnished by `seed`; on another `visit`, what can be moved was moved."""
     rng = np.random.default_rng(seed)
     shifted = [_shift_doors(room, rng) for room in ROOMS]
     doors = shapely.union_all([room.door(*door) for room in shifted for door in room.doors])
     rooms = shapely.union_all([room.inside for room in (*CORRIDORS, *shifted)])
     keep_free = doors.buffer(DOOR_CLEARANCE, join_style="mitre")
     furniture: list[BaseGeometry] = []
-    for room in (*CORRIDORS, *shifted):
-        furniture += _furnish(room, keep_free, rng)
+    for number, room in enumerate((*CORRIDORS, *shifted)):
+        moving = rng if visit is None else np.random.default_rng([seed, visit, number])
+        furniture += _furnish(room, keep_free, rng, moving, moves_last=visit is not None)
     free = shapely.union_all([rooms, doors, GLASS]).difference(shapely.union_all(furniture))
-    return make_world("office", free, GLASS, _stops(shifted))
+    world = make_world("office", free, GLASS, _stops(shifted))
+    return replace(world, doors=np.array([r.leaf(*door) for r in shifted for door in r.doors]))
 
 
 def _shift_doors(room: Room, rng: Generator) -> Room:
@@ -126,16 +139,29 @@ SIZES = {
     "chair": (0.18, 0.0), "table": (1.6, 0.8), "bench": (2.2, 0.75), "pillar": (0.4, 0.4),
     "crate": (0.6, 0.5),
 }  # fmt: skip
+MOVABLE = {"chair", "table", "crate", "bin"}
 FREE_STANDING = {"chair", "table", "pillar", "crate"}
 
 
-def _furnish(room: Room, keep_free: BaseGeometry, rng: Generator) -> list[BaseGeometry]:
-    """Return the solid parts of the furniture of `room`, clear of doors and of each other."""
+def _furnish(
+    room: Room, keep_free: BaseGeometry, rng: Generator, moving: Generator, *, moves_last: bool
+) -> list[BaseGeometry]:
+    """Return the solid parts of the furniture of `room`, clear of doors and of each other.
+
+    Parameters
+    ----------
+    rng, moving
+        Of what stays where it is, and of what can be moved.
+    moves_last
+        Whether what can be moved is put between all that stays.
+    """
     placed: list[BaseGeometry] = []
     solid: list[BaseGeometry] = []
-    for piece, count in FURNITURE[room.kind]:
+    pieces = FURNITURE[room.kind]
+    for piece, count in sorted(pieces, key=lambda p: p[0] in MOVABLE) if moves_last else pieces:
         for _ in range(count):
-            footprint, parts = _try_place(piece, room, [keep_free, *placed], rng)
+            drawn = moving if piece in MOVABLE else rng
+            footprint, parts = _try_place(piece, room, [keep_free, *placed], drawn)
             if footprint is not None:
                 placed.append(footprint.buffer(WALKWAY, join_style="mitre"))
                 solid += parts

@@ -5,7 +5,6 @@ robot's process is the same for a simulated and for a real log, and the truth ca
 """
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,27 +12,14 @@ import numpy as np
 
 from mapweave.errors import MapweaveError
 from mapweave.geometry.arrays import FloatArray
-from mapweave_deploy.sim.arena import arena
 from mapweave_deploy.sim.lidar import LidarParameters
-from mapweave_deploy.sim.office import office
-from mapweave_deploy.sim.own_body import OwnBodyParameters
-from mapweave_deploy.sim.people import PeopleParameters
+from mapweave_deploy.sim.lidars import LIDARS
+from mapweave_deploy.sim.settings import SETTINGS, Setting
 from mapweave_deploy.sim.sweeps import SweepParameters, sweeps
-from mapweave_deploy.sim.trajectories import Tour, TourParameters, plan_tours
+from mapweave_deploy.sim.trajectories import Tour, plan_tours
 from mapweave_deploy.sim.world import World
 
 TRUTH_FORMAT = "mapweave/truth/1"
-BUILDERS: dict[str, Callable[[int], World]] = {
-    "office": office,
-    "arena": arena,
-    "crowd": office,
-    "body": office,
-}
-TOURS = {name: TourParameters() for name in BUILDERS} | {"arena": TourParameters(length=30.0)}
-SWEEPS = {name: SweepParameters() for name in BUILDERS} | {
-    "crowd": SweepParameters(people=PeopleParameters(along=3)),
-    "body": SweepParameters(body=OwnBodyParameters(width=np.radians(120.0))),
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,21 +43,27 @@ class RobotLog:
 
 
 def simulate(
-    world: str = "office", robots: int = 2, seed: int = 1, folder: str | Path = "logs"
+    world: str = "office",
+    robots: int = 2,
+    seed: int = 1,
+    folder: str | Path = "logs",
+    lidar: str | None = None,
 ) -> list[RobotLog]:
     """Write ``r1.log``, ``r1-truth.json``, … into `folder`; the same seed gives the same bytes.
 
     Parameters
     ----------
     world
-        ``office`` or ``arena``; ``crowd``: the office, and people who walk with each robot;
-        ``body``: the office, seen by robots that see themselves.
+        Such as ``office`` or ``arena``: what there is, and what is hard in it, tells ``mapweave
+        team --help``.
     robots
         How many, each with a tour of its own.
     seed
         Of the world, the tours and the noise.
     folder
         Made where it is missing.
+    lidar
+        Of all robots, such as ``rplidar``; by default that of the world.
 
     Returns
     -------
@@ -81,22 +73,32 @@ def simulate(
     Raises
     ------
     MapweaveError
-        If there is no such world.
+        If there is no such world or lidar.
     """
-    if world not in BUILDERS:
-        raise MapweaveError(f"no world {world!r}; there are {', '.join(BUILDERS)}")
-    place = BUILDERS[world](seed)
-    tours = plan_tours(place, robots, TOURS[world], np.random.default_rng([seed, robots]))
+    setting = _setting(world, lidar)
+    ground, places = setting.places(seed, robots)
+    tours = plan_tours(ground, robots, setting.tours, np.random.default_rng([seed, robots]))
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     logs = []
-    for number, tour in enumerate(tours, start=1):
+    for number, (place, tour) in enumerate(zip(places, tours, strict=True), start=1):
         robot = f"r{number}"
         log = RobotLog(robot, target / f"{robot}.log", target / f"{robot}-truth.json", tour)
-        log.log.write_text(_measured(place, tour, SWEEPS[world], seed, number), encoding="ascii")
+        log.log.write_text(_measured(place, tour, setting.sweeps, seed, number), encoding="ascii")
         log.truth.write_text(_truth(place.name, seed, log), encoding="ascii")
         logs.append(log)
     return logs
+
+
+def _setting(world: str, lidar: str | None) -> Setting:
+    """Return the built-in world of that name, with the lidar of that name, if one is given."""
+    if world not in SETTINGS:
+        raise MapweaveError(f"no world {world!r}; there are {', '.join(SETTINGS)}")
+    if lidar is None:
+        return SETTINGS[world]
+    if lidar not in LIDARS:
+        raise MapweaveError(f"no lidar {lidar!r}; there are {', '.join(LIDARS)}")
+    return SETTINGS[world].with_lidar(LIDARS[lidar])
 
 
 def _measured(place: World, tour: Tour, around: SweepParameters, seed: int, number: int) -> str:
@@ -116,12 +118,16 @@ def scan_line(ranges: FloatArray, stamp: float, lidar: LidarParameters) -> str:
     range, accuracy, remission mode; n and the ranges; the number of remissions; laser pose, robot
     pose, tv, rv, two safety distances, turn axis; time stamp, host, logger's time stamp.
     """
-    n = lidar.beams
+    n, clockwise = lidar.beams, lidar.order == "clockwise"
+    first, step = -lidar.field_of_view / 2, lidar.field_of_view / (n - 1)
+    if clockwise:
+        first, step = -first, -step
     head = (
-        f"ROBOTLASER1 0 {-lidar.field_of_view / 2:.6f} {lidar.field_of_view:.6f}"
-        f" {lidar.field_of_view / (n - 1):.8f} {lidar.maximum_range:.2f} {lidar.noise:.3f} 0"
+        f"ROBOTLASER1 0 {first:.6f} {lidar.field_of_view:.6f}"
+        f" {step:.8f} {lidar.maximum_range:.2f} {lidar.noise:.3f} 0"
     )
-    readings = " ".join(f"{reading:.3f}" for reading in ranges)
+    told = ranges if lidar.order == "counter-clockwise" else ranges[::-1]
+    readings = " ".join(f"{reading:.3f}" for reading in told)
     zeros = " ".join(["0"] * 11)
     return f"{head} {n} {readings} 0 {zeros} {stamp:.6f} simulated {stamp:.6f}\n"
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
-from mapweave_deploy.sim.lidar import cast_rays
+from mapweave_deploy.sim.effects.rays import cast_rays
 from mapweave_deploy.sim.world import World
 
 PIECE = 0.25  # [m], walls are counted in pieces of this length

@@ -1,12 +1,17 @@
 """A simulated place: free space, the walls around it, and stops worth visiting."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave_deploy.sim.effects.terrain import LEVEL, Terrain
+
+
+def _none() -> FloatArray:
+    return np.empty((0, 4))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +30,12 @@ class World:
         (n,) which faces return little light: glass, black lacquer.
     stops
         (k, 2) places worth visiting [m], in free space.
+    glass, mirrors
+        (k, 4) faces that most light goes through, and faces that send it on; not among `walls`.
+    doors
+        (k, 4) leaves of doors where they are shut, from the hinge on [m].
+    terrain
+        Where the floor is not level.
     """
 
     name: str
@@ -32,6 +43,10 @@ class World:
     walls: FloatArray
     dark: BoolArray
     stops: FloatArray
+    glass: FloatArray = field(default_factory=_none)
+    mirrors: FloatArray = field(default_factory=_none)
+    doors: FloatArray = field(default_factory=_none)
+    terrain: Terrain = LEVEL
 
 
 def make_world(name: str, free: BaseGeometry, dark: BaseGeometry, stops: FloatArray) -> World:
@@ -42,6 +57,23 @@ def make_world(name: str, free: BaseGeometry, dark: BaseGeometry, stops: FloatAr
     is_dark = shapely.contains_xy(dark.buffer(0.01), middle[:, 0], middle[:, 1])
     inside = shapely.contains_xy(hall, stops[:, 0], stops[:, 1])
     return World(name, hall, walls, is_dark, stops[inside])
+
+
+def paned(world: World, glass: BaseGeometry, mirrors: BaseGeometry) -> World:
+    """Return `world` with its faces inside `glass` and `mirrors` made of these."""
+    middle = (world.walls[:, :2] + world.walls[:, 2:]) / 2
+    of_glass, of_mirror = (
+        shapely.contains_xy(area.buffer(0.01), middle[:, 0], middle[:, 1])
+        for area in (glass, mirrors)
+    )
+    solid = ~of_glass & ~of_mirror
+    return replace(
+        world,
+        walls=world.walls[solid],
+        dark=world.dark[solid],
+        glass=world.walls[of_glass],
+        mirrors=world.walls[of_mirror],
+    )
 
 
 def largest_polygon(shape: BaseGeometry) -> shapely.Polygon:

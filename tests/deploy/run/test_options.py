@@ -25,3 +25,10 @@ def test_an_argument_that_is_none_is_wrong_usage_said_in_words(
     assert option in said
     assert value in said
     assert "invalid _" not in said
+
+
+def test_a_lidar_is_given_to_simulated_robots_only(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["team", "a.log", "--lidar", "urg"])
+    assert ended.value.code == 2
+    assert "--lidar is of simulated robots: expected --world" in capsys.readouterr().err

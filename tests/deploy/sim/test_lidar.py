@@ -5,7 +5,8 @@ import pytest
 import shapely
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave_deploy.sim.lidar import LidarParameters, cast_rays, measure
+from mapweave_deploy.sim.effects.rays import cast_rays
+from mapweave_deploy.sim.lidar import LidarParameters, measure
 from mapweave_deploy.sim.office import office
 from mapweave_deploy.sim.world import World, make_world
 

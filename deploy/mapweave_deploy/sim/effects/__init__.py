@@ -1,0 +1,1 @@
+"""What makes a lidar see other than walls: glass, mirrors, doors, the floor."""

@@ -1,0 +1,1 @@
+"""Places built for what is hard in them."""
