@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.scan.free_space import from_rings, rings
@@ -32,8 +33,8 @@ def straightened(
     with np.errstate(invalid="ignore", divide="ignore"):
         deep = shapely.buffer(area, -depth, join_style="mitre")
         sharp = shapely.buffer(deep, depth, join_style="mitre", mitre_limit=2.0)
-    wide = shapely.intersection(sharp, area)  # where it tapers, a mitre goes beyond it
-    simple = shapely.simplify(wide, deviation)
+    wide = shapely.intersection(_valid(sharp), area)  # where it tapers, a mitre goes beyond it
+    simple = _valid(shapely.simplify(wide, deviation))
     whole = shapely.simplify(shapely.set_precision(simple, 1.0), 0.0)
     areas = [p for p in shapely.get_parts(whole) if isinstance(p, Polygon) and not p.is_empty]
     return tuple(
@@ -53,6 +54,13 @@ def cut_open(outside: IntArray, holes: Sequence[IntArray]) -> tuple[FloatArray, 
     if not area.is_valid:
         raise ValueError("an area whose outlines cross")
     return rings(area)
+
+
+def _valid(areas: BaseGeometry) -> BaseGeometry:
+    """Return `areas`; what lies twice in them, as mitred or simplified parts may, only once."""
+    if areas.is_valid:
+        return areas
+    return shapely.make_valid(areas, method="structure", keep_collapsed=False)
 
 
 def _corners(ring: shapely.LinearRing) -> IntArray:
