@@ -2,10 +2,12 @@
 
 import os
 import socket
+import ssl
 import threading
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
@@ -18,18 +20,20 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from mapweave.config import Config
-from mapweave.errors import ArgumentError
+from mapweave.errors import ArgumentError, FileError
 from mapweave_fusion_server.monitoring import monitoring_routes
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.access.guard import Guard
+from mapweave_fusion_server.web.access.member import CertifiedProtocol
 from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.api import Api
 from mapweave_fusion_server.web.events import Bell
 from mapweave_fusion_server.web.feed import Feed, Seen
-from mapweave_fusion_server.web.guard import Guard
 from mapweave_fusion_server.web.history import History
 from mapweave_fusion_server.web.knowledge import Knowledge
 from mapweave_fusion_server.web.orders import PageOrders
 from mapweave_fusion_server.web.story import StoryTail
+from mapweave_protocol.link.security.folder import AUTHORITY, CERTIFICATE, KEY, KeyFolder
 
 STATIC = Path(__file__).with_name("static")
 MAX_CONNECTIONS = 256
@@ -51,7 +55,7 @@ def live_page(
     config
         The coordinator's.
     token
-        What requests that change something must bring in a header.
+        What requests that change something must bring in a header, where there are no keys.
 
     Yields
     ------
@@ -80,12 +84,14 @@ def serving(
     ------
     ArgumentError
         If nothing can be served there.
+    FileError
+        If its keys cannot be used.
     """
-    listener = _listen(address)
-    bound = HttpAddress(address.host, listener.getsockname()[1])
-    server = uvicorn.Server(_configuration(application(bound, knowledge, bell, token)))
-    thread = threading.Thread(target=server.run, args=([listener],), name="page", daemon=True)
-    with _keeping_up(knowledge, bell):
+    with _listen(address) as listener, _keeping_up(knowledge, bell):
+        bound = replace(address, port=listener.getsockname()[1])
+        app = application(bound, knowledge, bell, token)
+        server = uvicorn.Server(_configuration(app, bound.keys))
+        thread = threading.Thread(target=server.run, args=([listener],), name="page", daemon=True)
         thread.start()
         try:
             yield bound
@@ -93,7 +99,6 @@ def serving(
             bell.close()
             server.should_exit = True
             thread.join()
-            listener.close()
 
 
 def application(address: HttpAddress, knowledge: Knowledge, bell: Bell, token: str) -> ASGIApp:
@@ -151,10 +156,10 @@ def _listen(address: HttpAddress) -> socket.socket:
         raise ArgumentError("--http", f"{address.authority}: {why}") from error
 
 
-def _configuration(app: ASGIApp) -> uvicorn.Config:
-    return uvicorn.Config(
+def _configuration(app: ASGIApp, keys: KeyFolder | None) -> uvicorn.Config:
+    config = uvicorn.Config(
         app,
-        http="h11",
+        http=CertifiedProtocol,
         ws="none",
         loop="asyncio",
         lifespan="off",
@@ -165,3 +170,13 @@ def _configuration(app: ASGIApp) -> uvicorn.Config:
         limit_concurrency=MAX_CONNECTIONS,
         timeout_graceful_shutdown=GRACE,
     )
+    if keys is not None:
+        config.ssl_certfile = keys.path / CERTIFICATE
+        config.ssl_keyfile = keys.path / KEY
+        config.ssl_ca_certs = str(keys.path / AUTHORITY)
+        config.ssl_cert_reqs = ssl.CERT_REQUIRED  # nobody speaks before he has shown who he is
+        try:
+            config.load()
+        except (OSError, ValueError) as error:
+            raise FileError(keys.path, f"no keys that can be used: {error}") from error
+    return config

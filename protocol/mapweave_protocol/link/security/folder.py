@@ -2,6 +2,7 @@
 
 import json
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -24,6 +25,7 @@ class _Identity(BaseModel):
     robots: tuple[str, ...] = ()
     operators: tuple[str, ...] = ()
     viewers: tuple[str, ...] = ()
+    page: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +39,16 @@ class KeyFolder:
     member
         Whose it is.
     roster
-        Who belongs to the team; the router needs it, and others have only their own name.
+        Who belongs to the team; the router needs it, and a coordinator with a page that is served
+        over the network. Others have only their own name.
+    page
+        Names and addresses by which others reach that page; our certificate is good for these.
     """
 
     path: Path
     member: Member
     roster: Roster
+    page: tuple[str, ...] = ()
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -63,7 +69,8 @@ class KeyFolder:
             raise FileError(key, "may be read by others; expected mode 0600: chmod 600")
         identity = _read_identity(path / IDENTITY)
         roster = Roster(identity.team, identity.robots, identity.operators, identity.viewers)
-        return cls(path, Member(identity.team, identity.role, identity.name), roster)
+        member = Member(identity.team, identity.role, identity.name)
+        return cls(path, member, roster, identity.page)
 
     def settings(self) -> dict[str, object]:
         """Return the settings of Zenoh by which a session proves who it is."""
@@ -83,8 +90,10 @@ class KeyFolder:
         }
 
 
-def write_identity(path: Path, member: Member, roster: Roster | None) -> None:
-    """Write who a folder is of; for the router with the whole roster."""
+def write_identity(
+    path: Path, member: Member, roster: Roster | None, page: Sequence[str] = ()
+) -> None:
+    """Write who a folder is of; for who lets others in, with the whole roster."""
     fields: dict[str, object] = {
         "team": member.team,
         "role": member.role.value,
@@ -96,6 +105,8 @@ def write_identity(path: Path, member: Member, roster: Roster | None) -> None:
             "operators": roster.operators,
             "viewers": roster.viewers,
         }
+    if page:
+        fields["page"] = tuple(page)
     (path / IDENTITY).write_text(json.dumps(fields, indent=2) + "\n")
 
 
