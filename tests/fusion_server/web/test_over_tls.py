@@ -2,12 +2,14 @@
 
 import http.client
 import json
+import re
 import shutil
 import socket
 import ssl
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -22,6 +24,7 @@ from mapweave.errors import FileError
 from mapweave_deploy.keys.authority import Authority
 from mapweave_deploy.keys.team_keys import make_keys, place_of
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.access.door import MAX_WAITING
 from mapweave_fusion_server.web.address import HttpAddress, with_keys
 from mapweave_fusion_server.web.feed import Feed
 from mapweave_fusion_server.web.server import live_page
@@ -196,6 +199,37 @@ def test_an_operator_s_browser_gives_an_order_in_the_name_of_its_certificate(
         expect(seen.tab.locator("#order")).to_be_hidden()
         context.close()
     assert [order.by for order in page.feed.orders()] == ["ann"]
+
+
+def test_who_is_refused_is_counted_and_told_with_the_reason(
+    page: SecurePage, caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises((ssl.SSLError, ConnectionError)):
+        page.ask("/api/robots", None)
+    assert page.ask("/api/orders", BOB, BAN).status == 403
+    metrics = page.ask("/metrics", BOB).body.decode()
+    for kind in ("connection", "request"):
+        assert f'mapweave_refused_total{{kind="{kind}",sender="page"}} 1.0' in metrics
+    assert "page: refused, peer did not return a certificate" in caplog.text
+    assert "/api/orders: refused, certificate: rescue.viewer.bob gives no orders" in caplog.text
+
+
+def test_those_who_connect_and_say_nothing_keep_nobody_out_and_are_few(page: SecurePage) -> None:
+    before = _descriptors()
+    with ExitStack() as stack:
+        port = page.address.port
+        for _ in range(3 * MAX_WAITING):
+            stack.enter_context(socket.create_connection(("127.0.0.1", port), PATIENCE))
+        assert page.ask("/api/me", ANN).json == {"operator": "ann"}
+        held = _descriptors() - before - 3 * MAX_WAITING
+    assert held <= 2 * MAX_WAITING
+    told = re.search(r'kind="connection",sender="page"} (\d+)', str(page.ask("/metrics", BOB).body))
+    assert told is not None
+    assert int(told[1]) >= 2 * MAX_WAITING
+
+
+def _descriptors() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
 
 
 def test_keys_that_are_damaged_end_in_one_line(team_keys: Path, tmp_path: Path) -> None:

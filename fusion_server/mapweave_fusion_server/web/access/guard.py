@@ -16,6 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from mapweave.text import shown
 from mapweave_fusion_server.web.access.member import note_member, shown_name
 from mapweave_fusion_server.web.address import HttpAddress
+from mapweave_protocol.link.guard.refusals import Refusals
 from mapweave_protocol.link.security.roster import Role
 
 TOKEN_HEADER = "X-Mapweave-Token"
@@ -55,14 +56,17 @@ class Guard:
         Where it is served.
     token
         What requests that change something must bring in a header, where nobody shows who he is.
+    refusals
+        Counts what is refused.
     """
 
-    def __init__(self, app: ASGIApp, address: HttpAddress, token: str) -> None:
+    def __init__(self, app: ASGIApp, address: HttpAddress, token: str, refusals: Refusals) -> None:
         self._app = app
         self._names = address.names
         self._origins = frozenset(address.origins)
         self._keys = address.keys
         self._token = token
+        self._refusals = refusals
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -76,6 +80,8 @@ class Guard:
 
         headers = Headers(scope=scope)
         refusal = self._refusal(headers) or self._refusal_of_sender(scope, headers)
+        if refusal is not None:
+            self._refusals.add("page", "request", scope["path"], refusal)
         app = self._app if refusal is None else PlainTextResponse(f"{refusal}\n", 403)
         await app(scope, receive, send_guarded)
 

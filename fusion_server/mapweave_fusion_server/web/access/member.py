@@ -1,38 +1,28 @@
 """Who asks, by the certificate shown: uvicorn checks it, and tells applications nothing of it."""
 
-import asyncio
 from collections.abc import Mapping
 from typing import Any
 
 from starlette.requests import Request
 from starlette.types import Scope
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from mapweave_protocol.link.security.roster import Member, Role
 
-_CERTIFICATE, _MEMBER = "certificate", "member"
+_NAME, _MEMBER = "common-name", "member"
 
 
-class CertifiedProtocol(H11Protocol):
-    """HTTP/1.1 that hands on to whom the other side's certificate is made out."""
-
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Note the common name, which no request of this connection can say otherwise."""
-        super().connection_made(transport)
-        shown = transport.get_extra_info("peercert")
-        self.app_state = {**self.app_state, _CERTIFICATE: common_name(shown)}
-
-
-def common_name(certificate: Mapping[str, Any] | None) -> str | None:
-    """Return the one common name of a certificate as `ssl` tells it, None if it has not one."""
+def note_certificate(
+    state: Mapping[str, Any], certificate: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """Return a connection's state with whose certificate was shown, as `ssl` tells that."""
     subject = (certificate or {}).get("subject", ())
     names = [value for part in subject for key, value in part if key == "commonName"]
-    return names[0] if len(names) == 1 else None
+    return {**state, _NAME: names[0] if len(names) == 1 else None}
 
 
 def shown_name(scope: Scope) -> str | None:
     """Return to whom the certificate is made out that came with a request."""
-    name: str | None = scope.get("state", {}).get(_CERTIFICATE)
+    name: str | None = scope.get("state", {}).get(_NAME)
     return name
 
 
