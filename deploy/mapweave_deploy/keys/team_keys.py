@@ -11,6 +11,7 @@ from mapweave_protocol.link.security.folder import (
     CERTIFICATE,
     IDENTITY,
     KeyFolder,
+    place_of,
     write_identity,
 )
 from mapweave_protocol.link.security.roster import Member, Role, Roster
@@ -59,12 +60,6 @@ def make_keys(
             _write_identity(path, member, roster, given)
     except OSError as error:
         raise FileError(folder, f"cannot be written ({error.strerror or error})") from error
-
-
-def place_of(member: Member) -> Path:
-    """Return the folder of a member, below that of the team's keys."""
-    single = member.role in (Role.ROUTER, Role.COORDINATOR)
-    return Path(member.name) if single else Path(f"{member.role.value}s") / member.name
 
 
 def _reached(member: Member, given: Sequence[str]) -> tuple[str, ...]:

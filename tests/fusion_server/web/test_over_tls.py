@@ -22,13 +22,13 @@ from mapweave.cli import main
 from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave_deploy.keys.authority import Authority
-from mapweave_deploy.keys.team_keys import make_keys, place_of
+from mapweave_deploy.keys.team_keys import make_keys
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.access.door import MAX_WAITING
 from mapweave_fusion_server.web.address import HttpAddress, with_keys
 from mapweave_fusion_server.web.feed import Feed
 from mapweave_fusion_server.web.server import live_page
-from mapweave_protocol.link.security.folder import KeyFolder
+from mapweave_protocol.link.security.folder import KeyFolder, place_of
 from mapweave_protocol.link.security.roster import Member, Role, Roster
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import JointMapMessage

@@ -90,6 +90,12 @@ class KeyFolder:
         }
 
 
+def place_of(member: Member) -> Path:
+    """Return the folder of a member, below that of the team's keys."""
+    single = member.role in (Role.ROUTER, Role.COORDINATOR)
+    return Path(member.name) if single else Path(f"{member.role.value}s") / member.name
+
+
 def write_identity(
     path: Path, member: Member, roster: Roster | None, page: Sequence[str] = ()
 ) -> None:
