@@ -1,6 +1,7 @@
 """A member's folder of keys: its certificate, its key, the team's authority, and who it is."""
 
 import json
+import os
 import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -64,6 +65,8 @@ class KeyFolder:
         for name in (AUTHORITY, CERTIFICATE, KEY, IDENTITY):
             if not (path / name).is_file():
                 raise FileError(path / name, "missing; expected a folder made by mapweave keys")
+            if not os.access(path / name, os.R_OK):
+                raise FileError(path / name, "may not be read by who runs this program")
         key = path / KEY
         if key.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
             raise FileError(key, "may be read by others; expected mode 0600: chmod 600")
