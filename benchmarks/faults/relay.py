@@ -40,7 +40,8 @@ class Relay:
     def __init__(
         self, target: str, *, delay: float = 0.0, loss: float = 0.0, seed: int = 0
     ) -> None:
-        host, _, port = target.removeprefix("tcp/").rpartition(":")
+        self._kind, _, address = target.partition("/")
+        host, _, port = address.rpartition(":")
         self._target = host, int(port)
         self._delay = delay
         self._loss = loss
@@ -58,7 +59,7 @@ class Relay:
     @property
     def endpoint(self) -> str:
         """Where clients connect."""
-        return f"tcp/127.0.0.1:{self._port}"
+        return f"{self._kind}/127.0.0.1:{self._port}"
 
     def __enter__(self) -> Self:
         self._thread.start()

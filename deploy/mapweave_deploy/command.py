@@ -126,13 +126,14 @@ def _plan(options: argparse.Namespace, folder: Folder, store: Path, states: Path
         team=options.team,
         members=_members(options, folder),
         rate=options.rate,
-        listen=options.listen or free_endpoint(),
+        listen=options.listen or free_endpoint(encrypted=options.tls is not None),
         store=store,
         timeout=options.timeout,
         config=options.config,
         states=states,
         page=None if options.http is None else with_free_port(options.http),
         token=new_token(),
+        keys=options.tls,
     )
 
 
@@ -181,7 +182,8 @@ def _source(options: argparse.Namespace) -> str:
 
 
 def _how_to_watch(plan: Plan) -> Iterator[str]:
-    yield f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}"
+    keys = "" if plan.keys is None else " --tls DIR, with keys of the team"
+    yield f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}{keys}"
     if plan.page is not None:
         yield f"Live page: {plan.page.url(plan.token)}"
 

@@ -27,8 +27,9 @@ from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import (
     TOKEN_VARIABLE,
     HttpAddress,
-    loopback_address,
+    http_address,
     new_token,
+    with_keys,
 )
 from mapweave_fusion_server.web.feed import Feed
 from mapweave_fusion_server.web.loading import live_page
@@ -58,9 +59,9 @@ def _configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--http",
-        type=argument(loopback_address),
+        type=argument(http_address),
         metavar="HOST:PORT",
-        help="serve the live page there, such as 127.0.0.1:8080: on this machine only",
+        help="serve the live page there, such as 127.0.0.1:8080; with --tls, to other machines too",
     )
     parser.add_argument(
         "--min-interval",
@@ -94,13 +95,14 @@ def _run(options: argparse.Namespace) -> int:
     begin_log(options, "coordinator")
     team, endpoints, link = connection_of(options)
     config = config_of(options)
+    page = None if options.http is None else with_keys(options.http, link.keys)
     parameters = CoordinatorParameters(min_interval=options.min_interval)
     path = options.store or default_store(team)
     retention = Retention(options.keep_versions, options.keep_days * DAY)
 
     with (
         Store(path, team, retention) as store,
-        _page(options.http, team, store, config) as feed,
+        _page(page, team, store, config) as feed,
         open_session(endpoints, on_wait=partial(tell_waiting, _log), link=link) as session,
         nullcontext() if feed is None else feed.positions.heard_on(session, team),
     ):

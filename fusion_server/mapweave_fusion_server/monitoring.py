@@ -10,15 +10,22 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
 from mapweave_fusion_server.web.feed import Feed, RobotReport, Seen
+from mapweave_protocol.link.guard.refusals import Refusals
 
 STALE = 10.0  # [s] without a word of the coordinator's loop, which speaks once a second
 _TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 
-def monitoring_routes(feed: Feed) -> list[Route]:
-    """Return what can be asked for, answered from what `feed` was handed."""
+def monitoring_routes(feed: Feed, refusals: Refusals) -> list[Route]:
+    """Return what can be asked for, answered from what `feed` was handed.
+
+    Parameters
+    ----------
+    refusals
+        Of those who ask here; the feed has those of the wire.
+    """
     registry = CollectorRegistry()
-    registry.register(_TeamCollector(feed))
+    registry.register(_TeamCollector(feed, refusals))
 
     async def metrics(_request: Request) -> Response:
         return Response(generate_latest(registry), media_type=_TYPE)
@@ -52,8 +59,9 @@ def _missing(feed: Feed) -> str | None:
 class _TeamCollector(Collector):
     """Turns what was seen last into metrics, when it is asked."""
 
-    def __init__(self, feed: Feed) -> None:
+    def __init__(self, feed: Feed, refusals: Refusals) -> None:
         self._feed = feed
+        self._refusals = refusals
 
     def collect(self) -> Iterator[Metric]:
         """Yield all of them."""
@@ -61,9 +69,12 @@ class _TeamCollector(Collector):
         yield from _of_coordinator(seen, self._feed.age)
         yield from _of_robots(seen.robots)
         refused = CounterMetricFamily(
-            "mapweave_refused", "Messages that were refused.", labels=["sender", "kind"]
+            "mapweave_refused",
+            "Messages and requests that were refused.",
+            labels=["sender", "kind"],
         )
-        for (sender, kind), count in seen.coordinator.refusals.items():
+        counts = {**seen.coordinator.refusals, **self._refusals.counts}
+        for (sender, kind), count in counts.items():
             refused.add_metric([sender, kind], count)
         yield refused
 

@@ -132,7 +132,7 @@ def test_a_file_that_is_no_store_is_named_and_left_as_it_was(
 
 
 def test_a_folder_is_no_store(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="cannot be read"):
+    with pytest.raises(FileError, match="not a file"):
         Store(tmp_path, "rescue")
 
 

@@ -21,7 +21,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from mapweave.errors import FileError
 from mapweave_protocol.link.security.folder import AUTHORITY, CERTIFICATE, KEY
-from mapweave_protocol.link.security.roster import Member, Role
+from mapweave_protocol.link.security.roster import Member
 
 AUTHORITY_KEY = "ca.key"
 EARLY = timedelta(days=1)  # clocks of robots go wrong: valid from before it is made
@@ -51,6 +51,7 @@ class Authority:
         certificate = (
             builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
             .add_extension(usage, critical=True)
+            .add_extension(_name_of(key.public_key()), critical=False)
             .sign(key, hashes.SHA256())
         )
         return cls(certificate, key)
@@ -86,17 +87,20 @@ class Authority:
         Parameters
         ----------
         hosts
-            Names and addresses under which it is reached.
+            Names and addresses under which it is reached: with any, it is a server's certificate.
         """
         key = ec.generate_private_key(ec.SECP256R1())
         subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, member.common_name)])
         builder = _builder(self.certificate.subject, subject, key.public_key(), now, days)
-        purposes = PURPOSES if member.role is Role.ROUTER else PURPOSES[:1]
+        purposes = PURPOSES if hosts else PURPOSES[:1]
+        signer = x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key())
         builder = (
             builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
             .add_extension(_usage(signs_certificates=False), critical=True)
             .add_extension(x509.ExtendedKeyUsage(purposes), critical=False)
             .add_extension(_names(member, hosts), critical=False)
+            .add_extension(_name_of(key.public_key()), critical=False)
+            .add_extension(signer, critical=False)  # Python 3.13 asks for both
         )
         certificate = builder.sign(self.key, hashes.SHA256())
         (folder / CERTIFICATE).write_bytes(certificate.public_bytes(Encoding.PEM))
@@ -124,6 +128,10 @@ def _builder(
         .not_valid_before(now.astimezone(UTC) - EARLY)
         .not_valid_after(now.astimezone(UTC) + timedelta(days=days))
     )
+
+
+def _name_of(key: ec.EllipticCurvePublicKey) -> x509.SubjectKeyIdentifier:
+    return x509.SubjectKeyIdentifier.from_public_key(key)
 
 
 def _usage(*, signs_certificates: bool) -> x509.KeyUsage:

@@ -29,6 +29,13 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         help="names and addresses of the router's machine, as others reach it",
     )
     parser.add_argument(
+        "--page",
+        nargs="+",
+        default=[],
+        metavar="HOST",
+        help="names and addresses of the coordinator's machine, for a page that others reach",
+    )
+    parser.add_argument(
         "--days",
         type=argument(whole),
         default=DEFAULT_DAYS,
@@ -57,7 +64,8 @@ def _made(roster: Roster, folder: Path, options: argparse.Namespace) -> Iterator
         if (error.name or "").partition(".")[0] != "cryptography":
             raise
         raise MissingExtraError("keys", "tls") from error
-    return make_keys(roster, folder, datetime.now(UTC), options.days, options.hosts)
+    now = datetime.now(UTC)
+    return make_keys(roster, folder, now, options.days, options.hosts, options.page)
 
 
 command = Command(

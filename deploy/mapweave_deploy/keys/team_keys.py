@@ -11,6 +11,7 @@ from mapweave_protocol.link.security.folder import (
     CERTIFICATE,
     IDENTITY,
     KeyFolder,
+    place_of,
     write_identity,
 )
 from mapweave_protocol.link.security.roster import Member, Role, Roster
@@ -19,12 +20,17 @@ HERE = ("localhost", "127.0.0.1", "::1")
 
 
 def make_keys(
-    roster: Roster, folder: Path, now: datetime, days: int, hosts: Sequence[str]
+    roster: Roster,
+    folder: Path,
+    now: datetime,
+    days: int,
+    hosts: Sequence[str],
+    page: Sequence[str] = (),
 ) -> Iterator[str]:
     """Make what is missing in `folder`, and yield the names of members that got keys.
 
-    Who has keys keeps them, and the router learns of everybody new: so a team grows by the same
-    command with one more name.
+    Who has keys keeps them, and those who let others in learn of everybody new: so a team grows by
+    the same command with one more name.
 
     Parameters
     ----------
@@ -32,6 +38,8 @@ def make_keys(
         From when, and for how many days, certificates are valid.
     hosts
         Names and addresses of the router's machine, beside this machine's own.
+    page
+        Likewise of the coordinator's, where others are to reach its page.
 
     Raises
     ------
@@ -45,20 +53,29 @@ def make_keys(
         for member in roster.members:
             path = folder / place_of(member)
             path.mkdir(parents=True, exist_ok=True, mode=0o700)
-            is_router = member.role is Role.ROUTER
-            if not (path / CERTIFICATE).exists() or (is_router and hosts):
-                reached = dict.fromkeys((*HERE, socket.gethostname(), *hosts))
-                authority.issue(member, path, now, days, tuple(reached) if is_router else ())
+            given = {Role.ROUTER: hosts, Role.COORDINATOR: page}.get(member.role, ())
+            if not (path / CERTIFICATE).exists() or given:
+                authority.issue(member, path, now, days, _reached(member, given))
                 yield member.name
-            write_identity(path, member, roster if is_router else None)
+            _write_identity(path, member, roster, given)
     except OSError as error:
         raise FileError(folder, f"cannot be written ({error.strerror or error})") from error
 
 
-def place_of(member: Member) -> Path:
-    """Return the folder of a member, below that of the team's keys."""
-    single = member.role in (Role.ROUTER, Role.COORDINATOR)
-    return Path(member.name) if single else Path(f"{member.role.value}s") / member.name
+def _reached(member: Member, given: Sequence[str]) -> tuple[str, ...]:
+    """Return all names of the machine of a member that serves others; none of one that does not."""
+    if member.role is not Role.ROUTER and not given:
+        return ()
+    return tuple(dict.fromkeys((*HERE, socket.gethostname(), *given)))
+
+
+def _write_identity(path: Path, member: Member, roster: Roster, given: Sequence[str]) -> None:
+    page: Sequence[str] = ()
+    if member.role is Role.COORDINATOR:
+        known = KeyFolder.read(path).page if (path / IDENTITY).exists() else ()
+        page = given or known
+    lets_in = member.role is Role.ROUTER or page
+    write_identity(path, member, roster if lets_in else None, page)
 
 
 def _with_earlier(roster: Roster, folder: Path) -> Roster:

@@ -20,6 +20,10 @@ from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.asking import ask_robot_map
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import Inbox
+from mapweave_protocol.link.security import roster
+from mapweave_protocol.link.security.folder import place_of
+from mapweave_protocol.link.security.roster import Role
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.keys import COORDINATOR_LIVE, everything
@@ -74,6 +78,8 @@ class Plan:
         Where the coordinator serves the live page, the port a given one; None where it does not.
     token
         What whoever gives orders by the page must know.
+    keys
+        The folder of the team's keys, as ``mapweave keys`` makes it; None where all may do all.
     """
 
     team: str
@@ -86,6 +92,7 @@ class Plan:
     config: Path | None = None
     page: HttpAddress | None = None
     token: str = ""
+    keys: Path | None = None
 
     @property
     def robots(self) -> list[str]:
@@ -101,6 +108,17 @@ class Plan:
     def computing(self) -> list[str]:
         """The arguments that every process takes that computes."""
         return [] if self.config is None else ["--config", str(self.config)]
+
+    def keys_of(self, role: Role, name: str = "") -> Path | None:
+        """Return the keys of one of the team; `name` is that of its role where there is one."""
+        if self.keys is None:
+            return None
+        return self.keys / place_of(roster.Member(self.team, role, name or role.value))
+
+    def proof(self, role: Role, name: str = "") -> list[str]:
+        """Return the arguments by which a process of the team proves who it is."""
+        keys = self.keys_of(role, name)
+        return [] if keys is None else ["--tls", str(keys)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,11 +140,11 @@ class TeamOutcome:
     recorder: Recorder
 
 
-def free_endpoint() -> str:
+def free_endpoint(*, encrypted: bool = False) -> str:
     """Return an endpoint on this machine with a port nobody listens at."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return f"{'tls' if encrypted else 'tcp'}/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def with_free_port(address: HttpAddress) -> HttpAddress:
@@ -152,8 +170,9 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
     deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
     start_router(crew, plan)
     recorder, inbox = Recorder(), Inbox(CAPACITY)
+    link = LinkSettings.of(plan.keys_of(Role.COORDINATOR), None)
     with (
-        open_session([plan.listen], patience=ROUTER_PATIENCE) as session,
+        open_session([plan.listen], patience=ROUTER_PATIENCE, link=link) as session,
         session.declare_subscriber(everything(plan.team), inbox.put),
     ):
         _start_all(crew, plan, session)
@@ -172,8 +191,8 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
 
 def start_router(crew: ProcessGroup, plan: Plan) -> None:
     """Start the router and wait until it listens."""
-    crew.start("router", ROUTER, ["router", "--listen", plan.listen])
-    host, _, port = plan.listen.removeprefix("tcp/").rpartition(":")
+    crew.start("router", ROUTER, ["router", "--listen", plan.listen, *plan.proof(Role.ROUTER)])
+    host, _, port = plan.listen.partition("/")[2].rpartition(":")
     deadline = time.monotonic() + ROUTER_PATIENCE
     while not _listens(host, int(port)):
         crew.check()
@@ -207,7 +226,8 @@ def _is_coordinated(session: zenoh.Session, team: str) -> bool:
 def start_server(crew: ProcessGroup, plan: Plan, store: Path) -> None:
     """Start the coordinator on `store`."""
     page = [] if plan.page is None else ["--http", plan.page.authority]
-    arguments = ["server", *plan.connection, *plan.computing, "--store", str(store), *page]
+    reach = [*plan.connection, *plan.proof(Role.COORDINATOR)]
+    arguments = ["server", *reach, *plan.computing, "--store", str(store), *page]
     # Others on this machine see arguments; they do not see the environment.
     crew.start("server", SERVER, arguments, {TOKEN_VARIABLE: plan.token} if page else {})
 
@@ -218,7 +238,8 @@ def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
     scans = ["--scans", f"{first}:{behind_last}"]
     source = ["--robot", member.robot, "--log", str(member.log), "--rate", plan.rate]
     state = ["--state", str(plan.states / member.robot)]
-    arguments = ["agent", *source, *scans, *state, *plan.connection, *plan.computing]
+    reach = [*plan.connection, *plan.proof(Role.ROBOT, member.robot)]
+    arguments = ["agent", *source, *scans, *state, *reach, *plan.computing]
     crew.start(f"agent {member.robot}", AGENT, arguments)
 
 

@@ -85,6 +85,12 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         help="where the router listens, such as tcp/127.0.0.1:7447 (default: a free port)",
     )
     parser.add_argument(
+        "--tls",
+        type=Path,
+        metavar="DIR",
+        help="run under keys: the whole folder that mapweave keys made, with those of robots r1 on",
+    )
+    parser.add_argument(
         "--http",
         type=argument(loopback_address),
         metavar="HOST:PORT",
@@ -144,7 +150,9 @@ def _rate(text: str) -> str:
 
 def _endpoint(text: str) -> str:
     """Return `text` if it is an endpoint that every process of the team can reach."""
-    match = re.fullmatch(r"tcp/[^\s/#?]+:([0-9]{1,5})", text)
+    match = re.fullmatch(r"(?:tcp|tls)/[^\s/#?]+:([0-9]{1,5})", text)
     if match is None or not 1 <= int(match[1]) <= MAX_PORT:
-        raise ValueError(f"{text}: expected tcp/HOST:PORT, the port from 1 to {MAX_PORT}")
+        raise ValueError(
+            f"{text}: expected tcp/HOST:PORT or tls/HOST:PORT, the port from 1 to {MAX_PORT}"
+        )
     return text

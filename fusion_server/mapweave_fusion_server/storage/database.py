@@ -40,15 +40,9 @@ class Database:
         self.path = path
         self._lock = threading.RLock()
         with self._errors_reported():
-            self._connection = sqlite3.connect(
-                f"{path.resolve().as_uri()}?mode=rw",
-                timeout=BUSY,
-                isolation_level=None,
-                check_same_thread=False,
-                uri=True,
-            )
+            self._connection = self._connect("mode=rw")
         if read_only:
-            self.rows("PRAGMA query_only = ON")
+            self._only_read()
 
     def close(self) -> None:
         """Close it; nothing may be asked of it after."""
@@ -98,6 +92,34 @@ class Database:
                 self._connection.backup(target)
             finally:
                 target.close()
+
+    def _connect(self, how: str) -> sqlite3.Connection:
+        return sqlite3.connect(
+            f"{self.path.resolve().as_uri()}?{how}",
+            timeout=BUSY,
+            isolation_level=None,
+            check_same_thread=False,
+            uri=True,
+        )
+
+    def _only_read(self) -> None:
+        """Write nothing; where nobody can, as on a medium that is read only, not even a journal."""
+        with self._errors_reported():
+            self._connection.execute("PRAGMA query_only = ON")
+            try:
+                self._connection.execute("PRAGMA schema_version")
+            except sqlite3.OperationalError as error:
+                if not error.sqlite_errorname.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")):
+                    raise
+                self._connection.close()
+                self._check_no_journal()
+                self._connection = self._connect("mode=ro&immutable=1")
+
+    def _check_no_journal(self) -> None:
+        journal = self.path.with_name(f"{self.path.name}-wal")
+        if journal.exists() and journal.stat().st_size > 0:
+            problem = "its journal cannot be read where nothing may be written; copy both elsewhere"
+            raise FileError(self.path, problem)
 
     @contextmanager
     def _errors_reported(self) -> Iterator[None]:

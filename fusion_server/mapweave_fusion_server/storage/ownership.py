@@ -15,12 +15,12 @@ def own(path: Path) -> int:
     Raises
     ------
     FileError
-        If another process has it, or it cannot be read.
+        If another process has it, or it may not be written: told now, and not by the first version.
     """
     try:
-        file = os.open(path, os.O_RDONLY)
+        file = os.open(path, os.O_RDWR)
     except OSError as error:
-        raise FileError(path, f"the store cannot be read: {error.strerror}") from error
+        raise FileError(path, f"the store cannot be written: {error.strerror}") from error
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

@@ -101,6 +101,8 @@ def is_missing(path: Path) -> bool:
         If there is something that is no store, or one of a schema unknown here.
     """
     try:
+        if path.exists() and not path.is_file():  # a device seems empty, a pipe never ends
+            raise FileError(path, "not a file; expected the name of one, for a mapweave store")
         with path.open("rb") as file:
             header = file.read(_HEADER_LENGTH)
     except FileNotFoundError:

@@ -20,6 +20,7 @@ from mapweave.errors import MapweaveError
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave.orders import MAX_REASON, Order, OrderKind
+from mapweave_fusion_server.web.access.member import operator_of
 from mapweave_fusion_server.web.knowledge import Knowledge
 from mapweave_protocol.operator.joins import found_between
 from mapweave_protocol.operator.making import order_between
@@ -73,10 +74,16 @@ class PageOrders:
     @property
     def routes(self) -> list[Route]:
         """What can be asked for, and by whom it is answered."""
-        return [Route("/api/orders", self._order, methods=["POST"])]
+        return [
+            Route("/api/orders", self._order, methods=["POST"]),
+            Route("/api/me", self._me),
+        ]
 
     async def _order(self, request: Request) -> Response:
         wish = _wish_of(await _body_of(request))
+        operator = operator_of(request)
+        if operator not in (None, wish.by):
+            raise HTTPException(403, f"by: expected {operator}, whose certificate it is")
         try:
             order = await run_in_threadpool(self._made, wish)
         except MapweaveError as error:
@@ -84,6 +91,11 @@ class PageOrders:
         if not self._known.feed.give_order(order):
             raise HTTPException(503, "too many orders wait already")
         return JSONResponse({"id": order.id}, 202)
+
+    async def _me(self, request: Request) -> Response:
+        """Answer with the operator that the sender's certificate is of."""
+        content = {"operator": operator_of(request)}
+        return JSONResponse(content, headers={"Cache-Control": "no-store"})
 
     def _made(self, wish: JoinWish | UndoWish) -> OrderMessage:
         joint = self._known.history.joint(self._known.history.latest)

@@ -1,11 +1,11 @@
 """Serves the page from a thread of its own, so that the coordinator's work goes on."""
 
-import os
-import socket
+import ssl
 import threading
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
@@ -18,21 +18,23 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from mapweave.config import Config
-from mapweave.errors import ArgumentError
+from mapweave.errors import FileError
 from mapweave_fusion_server.monitoring import monitoring_routes
 from mapweave_fusion_server.store import Store
+from mapweave_fusion_server.web.access.door import MAX_CONNECTIONS, MAX_WAITING, Door
+from mapweave_fusion_server.web.access.guard import Guard
 from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.api import Api
 from mapweave_fusion_server.web.events import Bell
 from mapweave_fusion_server.web.feed import Feed, Seen
-from mapweave_fusion_server.web.guard import Guard
 from mapweave_fusion_server.web.history import History
 from mapweave_fusion_server.web.knowledge import Knowledge
 from mapweave_fusion_server.web.orders import PageOrders
 from mapweave_fusion_server.web.story import StoryTail
+from mapweave_protocol.link.guard.refusals import Refusals
+from mapweave_protocol.link.security.folder import AUTHORITY, CERTIFICATE, KEY, KeyFolder
 
 STATIC = Path(__file__).with_name("static")
-MAX_CONNECTIONS = 256
 GRACE = 2  # [s] for answers that are under way when the server stops
 
 
@@ -51,7 +53,7 @@ def live_page(
     config
         The coordinator's.
     token
-        What requests that change something must bring in a header.
+        What requests that change something must bring in a header, where there are no keys.
 
     Yields
     ------
@@ -80,12 +82,15 @@ def serving(
     ------
     ArgumentError
         If nothing can be served there.
+    FileError
+        If its keys cannot be used.
     """
-    listener = _listen(address)
-    bound = HttpAddress(address.host, listener.getsockname()[1])
-    server = uvicorn.Server(_configuration(application(bound, knowledge, bell, token)))
-    thread = threading.Thread(target=server.run, args=([listener],), name="page", daemon=True)
-    with _keeping_up(knowledge, bell):
+    refusals = Refusals()
+    with Door(address, refusals) as door, _keeping_up(knowledge, bell):
+        bound = replace(address, port=door.getsockname()[1])
+        app = Guard(application(knowledge, bell, refusals), bound, token, refusals)
+        server = uvicorn.Server(_configuration(app, door, bound.keys))
+        thread = threading.Thread(target=server.run, args=([door],), name="page", daemon=True)
         thread.start()
         try:
             yield bound
@@ -93,22 +98,20 @@ def serving(
             bell.close()
             server.should_exit = True
             thread.join()
-            listener.close()
 
 
-def application(address: HttpAddress, knowledge: Knowledge, bell: Bell, token: str) -> ASGIApp:
-    """Return the page and the JSON interface, guarded."""
+def application(knowledge: Knowledge, bell: Bell, refusals: Refusals) -> ASGIApp:
+    """Return the page and the JSON interface, for who is let in."""
     routes = [
         Route("/", _page("index.html")),
         Route("/api", _page("api.html")),
         Route("/api/openapi.json", _page("openapi.json")),
         *Api(knowledge, bell).routes,
-        *monitoring_routes(knowledge.feed),
+        *monitoring_routes(knowledge.feed, refusals),
         *PageOrders(knowledge).routes,
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    handlers = {HTTPException: _tell}
-    return Guard(Starlette(routes=routes, exception_handlers=handlers), address, token)
+    return Starlette(routes=routes, exception_handlers={HTTPException: _tell})
 
 
 @contextmanager
@@ -142,19 +145,10 @@ async def _tell(_request: Request, error: Exception) -> Response:
     return PlainTextResponse(f"{detail}\n", status)
 
 
-def _listen(address: HttpAddress) -> socket.socket:
-    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
-    try:
-        return socket.create_server((address.host, address.port), family=family)
-    except OSError as error:
-        why = os.strerror(error.errno) if error.errno else str(error)
-        raise ArgumentError("--http", f"{address.authority}: {why}") from error
-
-
-def _configuration(app: ASGIApp) -> uvicorn.Config:
-    return uvicorn.Config(
+def _configuration(app: ASGIApp, door: Door, keys: KeyFolder | None) -> uvicorn.Config:
+    config = uvicorn.Config(
         app,
-        http="h11",
+        http=door.protocol(),
         ws="none",
         loop="asyncio",
         lifespan="off",
@@ -163,5 +157,18 @@ def _configuration(app: ASGIApp) -> uvicorn.Config:
         access_log=False,
         server_header=False,
         limit_concurrency=MAX_CONNECTIONS,
+        backlog=MAX_WAITING,
         timeout_graceful_shutdown=GRACE,
     )
+    if keys is not None:
+        config.ssl_certfile = keys.path / CERTIFICATE
+        config.ssl_keyfile = keys.path / KEY
+        config.ssl_ca_certs = str(keys.path / AUTHORITY)
+        config.ssl_cert_reqs = ssl.CERT_REQUIRED  # nobody speaks before he has shown who he is
+        try:
+            config.load()
+        except (OSError, ValueError) as error:
+            raise FileError(keys.path, f"no keys that can be used: {error}") from error
+        if config.ssl is not None:
+            door.told(config.ssl)
+    return config

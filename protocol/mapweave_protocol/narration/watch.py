@@ -54,6 +54,7 @@ from mapweave_protocol.wire.queries import JointQuery
 
 KEPT_LINES = 20  # of the story stay on the terminal
 POLL = 0.5  # [s]
+ASKED_EVERY = 1.0  # [s] between two questions for a version that was missed, at the least
 MAX_ROBOTS = 64  # told of
 HISTORY = {MAP: MESSAGES_TO_COMPLETE, STATUS: 1, ALIGNMENT: 1, JOINT_MAP: 1}
 
@@ -63,10 +64,19 @@ _log = logging.getLogger(__name__)
 
 
 class Watcher:
-    """Reads what arrives and tells it."""
+    """Reads what arrives and tells it.
+
+    Attributes
+    ----------
+    story
+        What it knows.
+    lacks_version
+        Whether the last version of the joint map said what changed of one that was missed.
+    """
 
     def __init__(self) -> None:
         self.story = Story()
+        self.lacks_version = False
         self._coverage = CoverageStory()
         self._assembler = MapAssembler()
         self._joint = JointAssembler()
@@ -87,13 +97,12 @@ class Watcher:
             yield from teller(arrival)
 
     def tell_joint(self, message: JointMapMessage) -> Iterator[str]:
-        """Yield the lines that tell a version of the joint map, once.
-
-        What changed of a version that was missed is passed over: a complete one comes soon.
-        """
+        """Yield the lines that tell a version of the joint map, once."""
         if self._told == (message.series, message.version):
+            self.lacks_version = False
             return
         whole = self._joint.update(message)
+        self.lacks_version = whole is None
         if whole is not None:
             self._told = message.series, message.version
             joint = whole.unpack()
@@ -152,19 +161,25 @@ def watch(
     inbox = Inbox()
     with open_session(endpoints, on_wait=on_wait, link=link) as session, ExitStack() as subscribers:
         _subscribe(session, team, inbox, subscribers)
-        for latest in _ask_latest(session, team):
-            yield from watcher.tell_joint(latest)
+        yield from _tell_latest(session, team, watcher)
+        due = time.monotonic()
         while True:
+            # A complete version may come late, or never where all robots are parked.
+            if watcher.lacks_version and time.monotonic() >= due:
+                yield from _tell_latest(session, team, watcher)
+                due = time.monotonic() + ASKED_EVERY
             arrival = inbox.get(POLL)
             yield from watcher.tell(arrival) if arrival else (None,)
 
 
-def _ask_latest(session: zenoh.Session, team: str) -> list[JointMapMessage]:
+def _tell_latest(session: zenoh.Session, team: str, watcher: Watcher) -> Iterator[str]:
     try:
-        return ask_joint_maps(session, team, JointQuery())
+        answers = ask_joint_maps(session, team, JointQuery())
     except MessageError as error:
         _log.warning("answer ignored, %s", error)
-        return []
+        return
+    for latest in answers:
+        yield from watcher.tell_joint(latest)
 
 
 def _subscribe(session: zenoh.Session, team: str, inbox: Inbox, stack: ExitStack) -> None:

@@ -12,8 +12,8 @@ from typing import TypeAlias
 import pytest
 import zenoh
 
-from mapweave_deploy.keys.team_keys import make_keys, place_of
-from mapweave_protocol.link.security.folder import KeyFolder
+from mapweave_deploy.keys.team_keys import make_keys
+from mapweave_protocol.link.security.folder import KeyFolder, place_of
 from mapweave_protocol.link.security.roster import Member, Role, Roster
 from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session

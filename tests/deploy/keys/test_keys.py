@@ -50,6 +50,21 @@ def test_only_the_router_is_a_server_and_only_it_has_the_roster(folder: Path) ->
     assert "10.0.0.7" in map(str, reached.get_values_for_type(x509.IPAddress))
 
 
+def test_a_coordinator_with_a_page_for_others_is_a_server_of_that_and_knows_the_team(
+    folder: Path,
+) -> None:
+    words = ["keys", "rescue", "--output", str(folder)]
+    assert main([*words, "--page", "base.local"]) == 0
+    assert main([*words, "--robots", "r3"]) == 0
+    keys = KeyFolder.read(folder / "coordinator")
+    assert (keys.page, keys.roster.robots) == (("base.local",), ("r1", "r2", "r3"))
+    certificate = x509.load_pem_x509_certificate((keys.path / "cert.pem").read_bytes())
+    usage = certificate.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
+    names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert x509.oid.ExtendedKeyUsageOID.SERVER_AUTH in usage
+    assert "base.local" in names.get_values_for_type(x509.DNSName)
+
+
 def test_nothing_secret_is_printed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["keys", "rescue", "--robots", "r3", "--output", str(folder)]) == 0
     said = capsys.readouterr()

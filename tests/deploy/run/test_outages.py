@@ -41,19 +41,19 @@ def says(folder: Path, process: str, words: str) -> bool:
     return log.exists() and words in log.read_text()
 
 
-def plan_of(members: list[Member], folder: Path) -> Plan:
+def plan_of(members: list[Member], folder: Path, keys: Path | None = None) -> Plan:
     """Return a plan whose processes keep everything in `folder`."""
-    listen, store = free_endpoint(), folder / "store.sqlite"
-    return Plan("t", members, "max", listen, store, folder / "states", None)
+    listen, store = free_endpoint(encrypted=keys is not None), folder / "store.sqlite"
+    return Plan("t", members, "max", listen, store, folder / "states", None, keys=keys)
 
 
 @pytest.fixture
-def plan(tmp_path: Path) -> Plan:
+def plan(tmp_path: Path, keys: Path | None) -> Plan:
     """Return a team of one robot, with a short log."""
     [robot] = simulate("arena", 1, 1, tmp_path / "logs")
     nothing = np.empty(0, dtype=np.int64)
     member = Member("r1", robot.log, (0, SCANS), "arena", nothing, np.empty((0, 3)))
-    return plan_of([member], tmp_path)
+    return plan_of([member], tmp_path, keys)
 
 
 def end(crew: ProcessGroup, child: Child) -> None:

@@ -17,10 +17,15 @@ from mapweave_deploy.run.launcher import (
     start_server,
 )
 from mapweave_deploy.run.processes import ProcessGroup
+from mapweave_protocol.link.security.roster import Role
 from mapweave_protocol.link.subscriber import poses
 from tests.deploy.run.test_claimants import joined_names
 from tests.deploy.run.test_outages import plan_of, says, until
 from tests.deploy.run.test_restarts import member
+
+pytestmark = pytest.mark.parametrize(
+    "keys", ["open", pytest.param("with keys", marks=pytest.mark.slow)], indirect=True
+)
 
 
 @dataclass
@@ -35,17 +40,18 @@ class Halves:
 
 
 @pytest.fixture
-def halves(tmp_path: Path) -> Iterator[Halves]:
+def halves(tmp_path: Path, keys: Path | None) -> Iterator[Halves]:
     """Return the halves, their routers linked."""
-    here = plan_of([replace(member("r1"), scans=(0, 55))], tmp_path)
-    there = replace(here, members=[replace(member("r2"), scans=(0, 55))], listen=free_endpoint())
+    here = plan_of([replace(member("r1"), scans=(0, 55))], tmp_path, keys)
+    listen = free_endpoint(encrypted=keys is not None)
+    there = replace(here, members=[replace(member("r2"), scans=(0, 55))], listen=listen)
     for folder in ("here", "there"):
         (tmp_path / folder).mkdir()
     with ProcessGroup(tmp_path / "here") as crew, ProcessGroup(tmp_path / "there") as others:
         start_router(crew, here)
         with Relay(here.listen) as link:
             route = ["router", "--listen", there.listen, "--connect", link.endpoint]
-            router = others.start("router", ROUTER, route)
+            router = others.start("router", ROUTER, [*route, *there.proof(Role.ROUTER)])
             until(lambda: "listening" in router.log.read_text())
             yield Halves(here, there, crew, others, link)
 

@@ -89,6 +89,26 @@ def test_there_is_a_unit_for_each_part() -> None:
             assert f"\n{setting}" in text
 
 
+@pytest.mark.parametrize(
+    "change", [("", ""), ("mem_limit", "mem_limt"), ("retries: 3", "retries: [3]")]
+)
+def test_the_compose_file_is_what_the_compose_schema_allows(
+    change: tuple[str, str], tmp_path: Path
+) -> None:
+    before, after = change
+    copy = tmp_path / "compose.yaml"
+    copy.write_text(
+        (CONTAINER / "compose.yaml").read_text().replace(before, after, 1 if before else 0)
+    )
+    checked = subprocess.run(
+        [MAPWEAVE.with_name("check-jsonschema"), "--builtin-schema", "vendor.compose-spec", copy],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (checked.returncode == 0) == (before == after), checked.stdout + checked.stderr
+
+
 def test_the_containers_start_commands_that_take_their_arguments() -> None:
     services = _compose()["services"]
     assert set(services) == {"router", "coordinator", "r1"}

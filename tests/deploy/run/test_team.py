@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,9 @@ import pytest
 from mapweave.config import Config, Mapping
 from mapweave.io.map_files import read_joint
 from mapweave.maps import parse_component
+from mapweave_deploy.keys.team_keys import make_keys
 from mapweave_fusion_server.store import Store
+from mapweave_protocol.link.security.roster import Roster
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.messages import JointMapMessage
 
@@ -41,11 +44,14 @@ def run_team(folder: Path, *arguments: str) -> Run:
 
 @pytest.fixture(scope="module")
 def arena(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Return what two robots in the arena came to, a little more patient than others."""
+    """Return what two robots came to, under keys, a little more patient than others."""
     folder = tmp_path_factory.mktemp("arena")
     config = folder / "patient.toml"
     config.write_text("[mapping]\npatience = 6\n")
-    return run_team(folder, "--world", "arena", "--robots", "2", "--config", str(config))
+    keys = folder / "keys"
+    list(make_keys(Roster("team", ("r1", "r2")), keys, datetime.now(UTC), 1, []))
+    given = ["--config", str(config), "--tls", str(keys)]
+    return run_team(folder, "--world", "arena", "--robots", "2", *given)
 
 
 def test_the_robots_end_in_one_component_rightly(arena: Run) -> None:

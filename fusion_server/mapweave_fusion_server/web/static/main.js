@@ -6,7 +6,7 @@ import { Evidence } from "./evidence.js";
 import { clock, counted, percent, robotOf } from "./format.js";
 import { fillLegend } from "./legend.js";
 import { MapView } from "./map.js";
-import { fillMarks, fillOrders } from "./orders.js";
+import { fillMarks, fillOrders, learnOperator } from "./orders.js";
 import { onThemeChange, setRobots } from "./palette.js";
 import { fetchJson, follow } from "./source.js";
 import { fillSure } from "./sure.js";
@@ -210,7 +210,7 @@ async function begin() {
   const { hash } = location;
   connectControls();
   writeLegend();
-  await timeline.load();
+  await Promise.all([timeline.load(), learnOperator()]);
   timeline.follow(hash);
   follow({ version: (event) => timeline.add(event), team: showTeam, story: ({ lines }) => addLines(lines), poses: ({ robots }) => map.setPoses(robots), contact: onContact });
 }

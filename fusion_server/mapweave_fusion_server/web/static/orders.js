@@ -2,14 +2,21 @@
 
 import { byId, element, refill, write } from "./dom.js";
 import { clock } from "./format.js";
-import { sendOrder } from "./source.js";
+import { fetchJson, sendOrder } from "./source.js";
 
 const DONE = { pin: "pins", forbid: "forbids", forget: "forgets" };
 const EFFECTS = { waits: "waits: what it is about is not here", outranked: "outranked by later orders" };
 const NAME = "mapweave-operator";
 
-/** Whether this page knows the secret that orders need. */
-export const mayOrder = () => sessionStorage.getItem("mapweave-token") !== null;
+let operator = null; // as whom the certificate of this browser says we come
+
+/** Learn who we are. */
+export async function learnOperator() {
+  operator = (await fetchJson("/api/me"))?.operator ?? null;
+}
+
+/** Whether this page knows the secret that orders need, or is an operator's. */
+const mayOrder = () => operator !== null || sessionStorage.getItem("mapweave-token") !== null;
 
 /** Return what an order is about, in a few words. */
 const aboutOf = (order) => (order.kind === "forget" ? `${order.robot}@${order.boots.join(", ")}` : `${order.reference} – ${order.other}`);
@@ -39,7 +46,7 @@ export function fillMarks(target, joint) {
     element("small", {}, `${clock(time)} · by ${by}, on the map of ${component}, at ${x.toFixed(1)}, ${y.toFixed(1)} m of ${frame}`))));
 }
 
-/** Return the buttons by which a decision is confirmed or forbidden; nothing where orders need a token. */
+/** Return the buttons by which a decision is confirmed or forbidden; nothing where none may be given. */
 export function buttonsFor(alignment) {
   if (!mayOrder()) return null;
   const { reference, other, evidence } = alignment;
@@ -70,7 +77,8 @@ function ask(title, text, deed, order) {
   write(byId("order-text"), text);
   write(confirm, deed);
   write(byId("order-problem"), "");
-  name.value = localStorage.getItem(NAME) ?? "";
+  name.value = operator ?? localStorage.getItem(NAME) ?? "";
+  name.readOnly = operator !== null;
   reason.value = "";
   confirm.onclick = async () => {
     if (!name.reportValidity() || !reason.reportValidity()) return;

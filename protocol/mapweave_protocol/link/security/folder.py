@@ -1,7 +1,9 @@
 """A member's folder of keys: its certificate, its key, the team's authority, and who it is."""
 
 import json
+import os
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -24,6 +26,7 @@ class _Identity(BaseModel):
     robots: tuple[str, ...] = ()
     operators: tuple[str, ...] = ()
     viewers: tuple[str, ...] = ()
+    page: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +40,16 @@ class KeyFolder:
     member
         Whose it is.
     roster
-        Who belongs to the team; the router needs it, and others have only their own name.
+        Who belongs to the team; the router needs it, and a coordinator with a page that is served
+        over the network. Others have only their own name.
+    page
+        Names and addresses by which others reach that page; our certificate is good for these.
     """
 
     path: Path
     member: Member
     roster: Roster
+    page: tuple[str, ...] = ()
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -58,12 +65,15 @@ class KeyFolder:
         for name in (AUTHORITY, CERTIFICATE, KEY, IDENTITY):
             if not (path / name).is_file():
                 raise FileError(path / name, "missing; expected a folder made by mapweave keys")
+            if not os.access(path / name, os.R_OK):
+                raise FileError(path / name, "may not be read by who runs this program")
         key = path / KEY
         if key.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
             raise FileError(key, "may be read by others; expected mode 0600: chmod 600")
         identity = _read_identity(path / IDENTITY)
         roster = Roster(identity.team, identity.robots, identity.operators, identity.viewers)
-        return cls(path, Member(identity.team, identity.role, identity.name), roster)
+        member = Member(identity.team, identity.role, identity.name)
+        return cls(path, member, roster, identity.page)
 
     def settings(self) -> dict[str, object]:
         """Return the settings of Zenoh by which a session proves who it is."""
@@ -83,8 +93,16 @@ class KeyFolder:
         }
 
 
-def write_identity(path: Path, member: Member, roster: Roster | None) -> None:
-    """Write who a folder is of; for the router with the whole roster."""
+def place_of(member: Member) -> Path:
+    """Return the folder of a member, below that of the team's keys."""
+    single = member.role in (Role.ROUTER, Role.COORDINATOR)
+    return Path(member.name) if single else Path(f"{member.role.value}s") / member.name
+
+
+def write_identity(
+    path: Path, member: Member, roster: Roster | None, page: Sequence[str] = ()
+) -> None:
+    """Write who a folder is of; for who lets others in, with the whole roster."""
     fields: dict[str, object] = {
         "team": member.team,
         "role": member.role.value,
@@ -96,6 +114,8 @@ def write_identity(path: Path, member: Member, roster: Roster | None) -> None:
             "operators": roster.operators,
             "viewers": roster.viewers,
         }
+    if page:
+        fields["page"] = tuple(page)
     (path / IDENTITY).write_text(json.dumps(fields, indent=2) + "\n")
 
 

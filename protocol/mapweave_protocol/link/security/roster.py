@@ -73,3 +73,7 @@ class Roster:
             (Role.VIEWER, self.viewers),
         )
         return tuple(Member(self.team, role, name) for role, names in named for name in names)
+
+    def member(self, common_name: str) -> Member | None:
+        """Return whose certificate is made out to `common_name`, None for a stranger's."""
+        return next((each for each in self.members if each.common_name == common_name), None)

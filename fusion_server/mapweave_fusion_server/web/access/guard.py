@@ -1,17 +1,23 @@
 """Who may ask: pages of this server and programs of this machine; orders need the token as well.
 
+Where others reach the page, who asks has shown a certificate: members of the team may look, and
+operators give orders.
+
 A page of another site can make a browser send requests here: its ``Origin`` says so. One whose name
 was made to point to this machine (DNS rebinding) is told by its ``Host``.
 """
 
 import secrets
-from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from mapweave.text import shown
+from mapweave_fusion_server.web.access.member import note_member, shown_name
 from mapweave_fusion_server.web.address import HttpAddress
+from mapweave_protocol.link.guard.refusals import Refusals
+from mapweave_protocol.link.security.roster import Role
 
 TOKEN_HEADER = "X-Mapweave-Token"
 CONTENT_SECURITY_POLICY = "; ".join(
@@ -49,13 +55,18 @@ class Guard:
     address
         Where it is served.
     token
-        What requests that change something must bring in a header.
+        What requests that change something must bring in a header, where nobody shows who he is.
+    refusals
+        Counts what is refused.
     """
 
-    def __init__(self, app: ASGIApp, address: HttpAddress, token: str) -> None:
+    def __init__(self, app: ASGIApp, address: HttpAddress, token: str, refusals: Refusals) -> None:
         self._app = app
-        self._hosts = frozenset(_names_of(address))
+        self._names = address.names
+        self._origins = frozenset(address.origins)
+        self._keys = address.keys
         self._token = token
+        self._refusals = refusals
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -67,31 +78,42 @@ class Guard:
                 MutableHeaders(scope=message).update(HEADERS)
             await send(message)
 
-        refusal = self._refusal(scope["method"], Headers(scope=scope))
+        headers = Headers(scope=scope)
+        refusal = self._refusal(headers) or self._refusal_of_sender(scope, headers)
+        if refusal is not None:
+            self._refusals.add("page", "request", scope["path"], refusal)
         app = self._app if refusal is None else PlainTextResponse(f"{refusal}\n", 403)
         await app(scope, receive, send_guarded)
 
-    def _refusal(self, method: str, headers: Headers) -> str | None:
-        """Return why a request is refused, None if it is not."""
-        if headers.getlist("host") not in [[host] for host in self._hosts]:
-            return f"Host: expected {sorted(self._hosts)[0]}"
-        origins = headers.getlist("origin")
-        if any(origin not in {f"http://{host}" for host in self._hosts} for origin in origins):
+    def _refusal(self, headers: Headers) -> str | None:
+        """Return why a request is refused whoever sends it, None if it is not."""
+        if headers.getlist("host") not in [[host] for host in self._names]:
+            return f"Host: expected {self._names[0]}"
+        if not self._origins.issuperset(headers.getlist("origin")):
             return "Origin: expected none but this server's own"
         foreign = headers.get("sec-fetch-site", "none") not in ("none", "same-origin")
         if foreign and headers.get("sec-fetch-mode") != "navigate":  # somebody may follow a link
             return "Sec-Fetch-Site: expected a request of this server's own pages"
-        if method not in SAFE_METHODS:
-            return self._refusal_of_order(headers)
         return None
 
-    def _refusal_of_order(self, headers: Headers) -> str | None:
+    def _refusal_of_sender(self, scope: Scope, headers: Headers) -> str | None:
+        """Return why this one may not ask so, None if it may."""
+        changes = scope["method"] not in SAFE_METHODS
+        if self._keys is None:
+            return self._refusal_of_token(headers) if changes else None
+        name = shown_name(scope)
+        member = None if name is None else self._keys.roster.member(name)
+        if member is None:
+            return (
+                f"certificate: {shown(name or 'none')} is nobody of team {self._keys.member.team}"
+            )
+        if changes and member.role is not Role.OPERATOR:
+            return f"certificate: {name} gives no orders; expected an operator's"
+        note_member(scope, member)
+        return None
+
+    def _refusal_of_token(self, headers: Headers) -> str | None:
         given = headers.get(TOKEN_HEADER, "").encode()
         if not secrets.compare_digest(given, self._token.encode()):
             return f"{TOKEN_HEADER}: expected the token of the address that was printed"
         return None
-
-
-def _names_of(address: HttpAddress) -> Iterable[str]:
-    yield address.authority
-    yield f"localhost:{address.port}"
