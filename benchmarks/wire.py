@@ -62,7 +62,7 @@ class Bytes:
     up, down
         Sent and received [bytes].
     topics
-        Payloads that it sent, by kind of message [bytes].
+        Payloads that it sent, by kind of message, and all else that passed [bytes].
     key_scans
         Its scans half a metre or half a radian apart, compressed [bytes].
     once, grid, deflated
@@ -91,6 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--logs", default=f"fr079,intel,{DEMO}", help="cut up (%(default)s)")
     parser.add_argument("--rates", default="max,1", help="times real time (%(default)s)")
     parser.add_argument("--robots", type=int, default=3, metavar="N", help="in a team (3)")
+    parser.add_argument("--scans", type=int, metavar="N", help="of each robot, the first ones")
     parser.add_argument("--output", type=Path, default=OUTPUT / "wire.json", help="(%(default)s)")
 
 
@@ -100,6 +101,8 @@ def run(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for name in options.logs.split(","):
             members = _members(name, options.robots, Path(folder))
+            if options.scans is not None:
+                members = [_beginning(member, options.scans) for member in members]
             for rate in options.rates.split(","):
                 rows += count(f"{name} {rate}", members, rate)
                 print(tell(rows[-len(members) :]), flush=True)
@@ -114,6 +117,11 @@ def _members(name: str, robots: int, folder: Path) -> list[Member]:
         return simulated_team(DEMO, robots, 1, folder)
     (log,) = find_logs([name])
     return team_from_logs([log.path], robots)
+
+
+def _beginning(member: Member, scans: int) -> Member:
+    first, behind = member.scans
+    return replace(member, scans=(first, min(first + scans, behind)))
 
 
 def count(run_name: str, members: list[Member], rate: str) -> list[Bytes]:
@@ -169,7 +177,9 @@ def _row(
     name: str, member: Member, robot_map: RobotMap, up: int, down: int, status: StatusMessage
 ) -> Bytes:
     plain, deflated = grid_bytes(member, robot_map)
-    topics = {kind: sent.bytes for kind, sent in status.sent.items()}
+    topics: dict[str, int] = {kind: sent.bytes for kind, sent in status.sent.items()}
+    # Where nobody subscribes, as to poses here, what is published does not travel.
+    topics["Zenoh"] = up - sum(size for kind, size in topics.items() if kind != "pose")
     once = len(encode(MapMessage.pack(robot_map)))
     metres, scans = driven(member), key_scan_bytes(member, robot_map)
     return Bytes(name, member.robot, metres, up, down, topics, scans, once, plain, deflated)

@@ -6,10 +6,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave_protocol.link.lacking import GRACE
 
 MOST_SAVED = 1000.0  # [bytes], and most that is owed: a whole map now and then is no growth
-AGAIN = GRACE + 0.5  # [s] after somebody came: what is still missing then did not arrive by itself
 
 
 class AgentParameters(BaseModel):
@@ -53,7 +51,10 @@ class AgentParameters(BaseModel):
         description="[1/s] of maps besides: a place may change while it stands",
     )
     status_interval: float = Field(
-        10.0, gt=0, description="[s] between statuses: a slow robot drives 2 m meanwhile"
+        30.0,
+        gt=0,
+        description="[s] between statuses though nothing but progress is to be said, half of it"
+        " while a peer's map is lacking; a slow robot drives 5 m meanwhile",
     )
     least_status_interval: float = Field(
         1.0, ge=0, description="[s] after a status before the next, whatever has changed"
@@ -119,33 +120,3 @@ class RegularSchedule:
     def done(self, now: float) -> None:
         """Note that it was done."""
         self._last = now
-
-
-class StatusSchedule:
-    """When to say how one is: when something has changed, when somebody comes, and now and then."""
-
-    def __init__(self, parameters: AgentParameters) -> None:
-        self._parameters = parameters
-        self._said: object = None
-        self._last = -math.inf
-        self._heard_again = -math.inf
-
-    def met(self, now: float) -> None:
-        """Note that somebody came or went: who was away hears at once what is here, and again.
-
-        The second time tells whether what the first one said was missing is still on its way.
-        """
-        self._last = min(self._last, now - self._parameters.status_interval)
-        self._heard_again = now + AGAIN
-
-    def due(self, now: float, state: object) -> bool:
-        """Tell whether a status is to be sent; `state` is what others are told of at once."""
-        waited = now - self._last
-        if waited < self._parameters.least_status_interval:
-            return False
-        again = self._last < self._heard_again <= now
-        return again or state != self._said or waited >= self._parameters.status_interval
-
-    def sent(self, now: float, state: object) -> None:
-        """Note that a status was sent."""
-        self._last, self._said = now, state

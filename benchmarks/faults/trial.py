@@ -24,7 +24,7 @@ from mapweave_deploy.run.team_plan import Member
 CASE = Path(__file__).parents[2] / "tests" / "cases" / "restart_same_id"
 COORDINATOR = "coordinator"
 SUBSCRIBER = "subscriber"
-PATIENCE = 180.0  # [s] for a machine with much else to do
+PATIENCE = 900.0  # [s] for a machine with much else to do
 POLL = 0.05  # [s]
 
 
