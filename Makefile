@@ -107,13 +107,14 @@ bench-shape: $(KERNELS)
 bench-fusion: $(KERNELS)
 	$(BIN)/python -m benchmarks fusion
 
-# An hour and more: hostile messages, outages, kills, lossy links; SEEDS=5 for fewer outages,
+# An hour and more: hostile messages, outages, kills, lossy links, subscribers; SEEDS=5 for fewer outages,
 # EVENTS=10 for fewer kills.
 bench-faults: $(KERNELS)
 	$(BIN)/python -m benchmarks hostile
 	$(BIN)/python -m benchmarks outages --seeds $(or $(SEEDS),50)
 	$(BIN)/python -m benchmarks kills --events $(or $(EVENTS),50)
 	$(BIN)/python -m benchmarks lossy
+	$(BIN)/python -m benchmarks subscribers
 
 # What was made of the sources; results (demo, team, bench) stay.
 clean:
