@@ -32,9 +32,10 @@ ASLEEP = 60.0  # [s]
 WITHIN = 2.0  # [s] from a version's publication, or one's own coming, to having it
 RATE = 2.0
 PROGRAM = """
-import sys, mapweave_protocol
+import sys
+from mapweave_protocol import joint_maps
 print("ready", flush=True)
-for joint in mapweave_protocol.joint_maps(sys.argv[1], connect=sys.argv[2]):
+for joint in joint_maps(sys.argv[1], connect=sys.argv[2]):
     print(joint.version, flush=True)
 """
 
