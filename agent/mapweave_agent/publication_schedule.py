@@ -7,6 +7,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arrays import FloatArray
 
+FRAME = (
+    50  # [bytes] that Zenoh adds to a message: whose it is, its number, and that it was the last
+)
 MOST_SAVED = 1000.0  # [bytes], and most that is owed: a whole map now and then is no growth
 
 
@@ -43,7 +46,7 @@ class AgentParameters(BaseModel):
         10.0, gt=0, description="[s] after which it is published though less was driven"
     )
     bytes_per_metre: float = Field(
-        70.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
+        60.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
     )
     bytes_per_second: float = Field(
         2.0,
@@ -95,8 +98,9 @@ class PublicationSchedule:
         return self._driven >= p.map_distance or waited >= p.map_patience
 
     def published(self, now: float, size: int = 0) -> None:
-        """Note that the map has been published, in so many bytes."""
+        """Note that the map has been published, in a payload of `size` [bytes]."""
         waited = 0.0 if self._last is None else now - self._last
+        size += FRAME
         allowed = self._allowed + waited * self._parameters.bytes_per_second - size
         self._allowed = min(max(allowed, -MOST_SAVED), MOST_SAVED)
         if not self._urgent:
