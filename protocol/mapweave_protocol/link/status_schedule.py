@@ -7,8 +7,9 @@ import math
 
 from mapweave_protocol.link.lacking import GRACE
 
-COORDINATOR_INTERVAL = 5.0  # [s] between statuses of a coordinator, though nothing changes
+COORDINATOR_INTERVAL = 15.0  # [s] between statuses of a coordinator, though nothing changes
 AGAIN = GRACE + 0.5  # [s] after somebody came: what is still missing then did not arrive by itself
+TIMES = 2  # that it is said again: the first status may come before the other's link is whole
 
 
 class StatusSchedule:
@@ -27,7 +28,7 @@ class StatusSchedule:
         self._least = least
         self._said: object = None
         self._last = -math.inf
-        self._heard_again = -math.inf
+        self._met = -math.inf
 
     def met(self, now: float) -> None:
         """Note that somebody came: who was away hears at once what is here, and again.
@@ -35,7 +36,7 @@ class StatusSchedule:
         The second time tells whether what the first one said was missing is still on its way.
         """
         self._last = min(self._last, now - self._interval)
-        self._heard_again = now + AGAIN
+        self._met = now
 
     def hurry(self) -> None:
         """Note that there is something that is waited for."""
@@ -56,7 +57,8 @@ class StatusSchedule:
         waited = now - self._last
         if waited < self._least:
             return False
-        again = self._last < self._heard_again <= now
+        times = (self._met + k * AGAIN for k in range(1, TIMES + 1))
+        again = any(self._last < time <= now for time in times)
         interval = self._interval / 2 if lacks else self._interval
         return again or state != self._said or waited >= interval
 
