@@ -250,6 +250,7 @@ class AgentRun:
         now = time.monotonic()
         if self._reception.met():
             self._statuses.met(now)
+            self._needs.met(now)
         if self._marks.is_news:
             self._publish_marks()
         if self._changed and not self._finished and self._publication.due(now):
@@ -281,6 +282,7 @@ class AgentRun:
             self._outbox.send_past(self._past[run])
         for message in missing.alignments:
             self._outbox.send_alignments(message)
+            self._needs.published(now, message)
         for run in missing.marks:
             self._outbox.send_marks(marked.get(run) or self._marks.message())
         if self._orders.lacks(now):
@@ -310,7 +312,9 @@ class AgentRun:
         if found is None:
             return ()
         message = message_of(self._mapper.robot, outcome.comparison, found)
-        self._outbox.send_news(message, final=self._comparisons.is_final(outcome.comparison))
+        final = self._comparisons.is_final(outcome.comparison)
+        self._outbox.send_news(message, final=final)
+        self._needs.published(time.monotonic(), message)
         self._whereabouts.met(message)
         self._state.keep_found(self._mapper.boot, self._outbox.found)
         return found
@@ -322,7 +326,9 @@ class AgentRun:
         self._tell(self._published)
         self._keep(self._published)
         self._comparisons.own_map(arrives, finished=self._finished)
-        self._publication.published(time.monotonic(), size)
+        now = time.monotonic()
+        self._publication.published(now, size)
+        self._needs.published(now)
 
     def _draw(self) -> RobotMap:
         """Return the map as it is now; what changes while it is drawn is still to be kept."""
