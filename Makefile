@@ -101,21 +101,20 @@ bench-live: $(KERNELS)
 bench-speed: $(KERNELS)
 	$(BIN)/python -m benchmarks speed
 
-bench-faults: $(KERNELS)
-	$(BIN)/python -m benchmarks hostile
-
 bench-shape: $(KERNELS)
 	$(BIN)/python -m benchmarks shape --stretches 3 6
 
 bench-fusion: $(KERNELS)
 	$(BIN)/python -m benchmarks fusion
 
-# Half an hour: outages, kills, lossy links; SEEDS=5 for fewer outages, EVENTS=10 for fewer kills.
-.PHONY: bench-faults
+# An hour and more: hostile messages, outages, kills, lossy links, subscribers; SEEDS=5 for fewer outages,
+# EVENTS=10 for fewer kills.
 bench-faults: $(KERNELS)
+	$(BIN)/python -m benchmarks hostile
 	$(BIN)/python -m benchmarks outages --seeds $(or $(SEEDS),50)
 	$(BIN)/python -m benchmarks kills --events $(or $(EVENTS),50)
 	$(BIN)/python -m benchmarks lossy
+	$(BIN)/python -m benchmarks subscribers
 
 # What was made of the sources; results (demo, team, bench) stay.
 clean:

@@ -26,7 +26,7 @@ from benchmarks import (
     usual_counts,
     wire,
 )
-from benchmarks.faults import hostile, kills, lossy, outages
+from benchmarks.faults import hostile, kills, lossy, outages, subscribers
 from benchmarks.speed import command as speed
 
 
@@ -64,6 +64,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "outages": outages,
     "kills": kills,
     "lossy": lossy,
+    "subscribers": subscribers,
     "page": page,
     "mutations": mutations,
 }

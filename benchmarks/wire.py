@@ -8,8 +8,8 @@ import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -37,15 +37,18 @@ from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.inbox import Inbox, status_reader
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.codec import encode
-from mapweave_protocol.wire.keys import STATUS
+from mapweave_protocol.wire.keys import JOINT_MAP, STATUS
 from mapweave_protocol.wire.messages import MapMessage, StatusMessage
 
 DEMO = "office"
 BAR = 250.0  # [bytes] a metre
 SHARE = 0.5  # of compressed key scans
+JOINT_BAR = 2000.0  # [bytes/s] of versions of the joint map, mean over any minute
+MINUTE = 60.0  # [s]
 AFTER = 10.0  # [s] that are counted after a robot's last scan
 IDLE = 10.0  # [s] that Zenoh's own keep-alive is measured
-HEAD = ["run", "robot", "m", "up B/m", "bar", "ratio", "down B/m", "key scans B/m", "bar", "ratio"]
+HEAD = ["run", "joint B/s", "robot", "m", "up B/m", "bar", "ratio", "down B/m"]
+HEAD += ["key scans B/m", "bar", "ratio"]
 HEAD += ["map kB", "grid kB", "deflated kB", "by topic B/m"]
 
 
@@ -61,8 +64,10 @@ class Bytes:
         Driven, by the log's poses.
     up, down
         Sent and received [bytes].
+    joint
+        Versions of the joint map in the minute in which most came [bytes/s].
     topics
-        Payloads that it sent, by kind of message [bytes].
+        Payloads that it sent, by kind of message, and all else that passed [bytes].
     key_scans
         Its scans half a metre or half a radian apart, compressed [bytes].
     once, grid, deflated
@@ -74,6 +79,7 @@ class Bytes:
     metres: float
     up: int
     down: int
+    joint: float
     topics: dict[str, int]
     key_scans: int
     once: int
@@ -82,8 +88,9 @@ class Bytes:
 
     @property
     def enough(self) -> bool:
-        """Whether it reaches both bars."""
-        return self.up <= BAR * self.metres and self.up <= SHARE * self.key_scans
+        """Whether it reaches all bars."""
+        few = self.up <= min(BAR * self.metres, SHARE * self.key_scans)
+        return few and self.joint <= JOINT_BAR
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,6 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--logs", default=f"fr079,intel,{DEMO}", help="cut up (%(default)s)")
     parser.add_argument("--rates", default="max,1", help="times real time (%(default)s)")
     parser.add_argument("--robots", type=int, default=3, metavar="N", help="in a team (3)")
+    parser.add_argument("--scans", type=int, metavar="N", help="of each robot, the first ones")
     parser.add_argument("--output", type=Path, default=OUTPUT / "wire.json", help="(%(default)s)")
 
 
@@ -100,6 +108,8 @@ def run(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for name in options.logs.split(","):
             members = _members(name, options.robots, Path(folder))
+            if options.scans is not None:
+                members = [_beginning(member, options.scans) for member in members]
             for rate in options.rates.split(","):
                 rows += count(f"{name} {rate}", members, rate)
                 print(tell(rows[-len(members) :]), flush=True)
@@ -116,6 +126,11 @@ def _members(name: str, robots: int, folder: Path) -> list[Member]:
     return team_from_logs([log.path], robots)
 
 
+def _beginning(member: Member, scans: int) -> Member:
+    first, behind = member.scans
+    return replace(member, scans=(first, min(first + scans, behind)))
+
+
 def count(run_name: str, members: list[Member], rate: str) -> list[Bytes]:
     """Return what each robot of a team sent and got."""
     with ExitStack() as stack:
@@ -126,13 +141,41 @@ def count(run_name: str, members: list[Member], rate: str) -> list[Bytes]:
         session = stack.enter_context(open_session([plan.listen], patience=ROUTER_PATIENCE))
         inbox = Inbox()
         stack.enter_context(session.declare_subscriber(STATUS.pattern(team=plan.team), inbox.put))
+        versions: list[tuple[float, int]] = []
+        stack.enter_context(_counting(session, plan.team, versions))
         start_server(crew, plan, plan.store)
         relays = {m.robot: stack.enter_context(relay_to(plan.listen)) for m in members}
         for member in members:
             start_agent(crew, replace(plan, listen=relays[member.robot].endpoint), member)
         counted = _follow(crew, inbox, relays)
         maps = {member.robot: _last_map(session, plan.team, member.robot) for member in members}
-    return [_row(run_name, m, maps[m.robot], *counted[m.robot]) for m in members]
+    joint = busiest_minute(versions)
+    return [_row(run_name, m, maps[m.robot], joint, *counted[m.robot]) for m in members]
+
+
+@contextmanager
+def _counting(
+    session: zenoh.Session, team: str, versions: list[tuple[float, int]]
+) -> Iterator[None]:
+    """Note when each version of the joint map comes [s], and its size."""
+
+    def note(sample: zenoh.Sample) -> None:
+        versions.append((time.monotonic(), len(sample.payload)))
+
+    with session.declare_subscriber(JOINT_MAP.build(team=team), note):
+        yield
+
+
+def busiest_minute(sent: Sequence[tuple[float, int]]) -> float:
+    """Return what was sent in the minute in which most was [bytes/s].
+
+    Parameters
+    ----------
+    sent
+        When [s], ascending, and how much [bytes].
+    """
+    minutes = ([size for t, size in sent if at <= t < at + MINUTE] for at, _ in sent)
+    return max(map(sum, minutes), default=0) / MINUTE
 
 
 def _follow(
@@ -166,13 +209,21 @@ def _last_map(session: zenoh.Session, team: str, robot: str) -> RobotMap:
 
 
 def _row(
-    name: str, member: Member, robot_map: RobotMap, up: int, down: int, status: StatusMessage
+    name: str,
+    member: Member,
+    robot_map: RobotMap,
+    joint: float,
+    up: int,
+    down: int,
+    status: StatusMessage,
 ) -> Bytes:
     plain, deflated = grid_bytes(member, robot_map)
-    topics = {kind: sent.bytes for kind, sent in status.sent.items()}
+    topics: dict[str, int] = {kind: sent.bytes for kind, sent in status.sent.items()}
+    # Where nobody subscribes, as to poses here, what is published does not travel.
+    topics["Zenoh"] = up - sum(size for kind, size in topics.items() if kind != "pose")
     once = len(encode(MapMessage.pack(robot_map)))
     metres, scans = driven(member), key_scan_bytes(member, robot_map)
-    return Bytes(name, member.robot, metres, up, down, topics, scans, once, plain, deflated)
+    return Bytes(name, member.robot, metres, up, down, joint, topics, scans, once, plain, deflated)
 
 
 def driven(member: Member) -> float:
@@ -207,6 +258,7 @@ def _cells(row: Bytes) -> list[str]:
     topics = ", ".join(f"{kind} {size / row.metres:.0f}" for kind, size in row.topics.items())
     return [
         row.run,
+        f"{row.joint:.0f}",
         row.robot,
         f"{row.metres:.0f}",
         f"{sent:.0f}",

@@ -29,12 +29,17 @@ from mapweave_agent.publication_schedule import (
     AgentParameters,
     PublicationSchedule,
     RegularSchedule,
-    StatusSchedule,
 )
 from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
-from mapweave_protocol.link.asking import request_map, request_orders_of_coordinator
+from mapweave_protocol.link.asking import (
+    ALL_ORDERS,
+    ITS_STATUS,
+    request_map,
+    request_orders_of_coordinator,
+)
 from mapweave_protocol.link.inbox import Inbox
+from mapweave_protocol.link.status_schedule import StatusSchedule
 from mapweave_protocol.wire.messages import MapVersion, PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
@@ -95,7 +100,9 @@ class AgentRun:
         self._first = first
         self._tell = tell
         self._publication = PublicationSchedule(parameters)
-        self._statuses = StatusSchedule(parameters)
+        self._statuses = StatusSchedule(
+            parameters.status_interval, parameters.least_status_interval
+        )
         self._keeping = RegularSchedule(parameters.state_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
         for run in past:
@@ -243,6 +250,7 @@ class AgentRun:
         now = time.monotonic()
         if self._reception.met():
             self._statuses.met(now)
+            self._needs.met(now)
         if self._marks.is_news:
             self._publish_marks()
         if self._changed and not self._finished and self._publication.due(now):
@@ -251,7 +259,7 @@ class AgentRun:
             self._keep(self._draw())
         self._compare(now)
         self._supply(now)
-        if self._statuses.due(now, self._state_told):
+        if self._statuses.due(now, self._state_told, lacks=bool(self._reception.lacking)):
             self._publish_status()
 
     @property
@@ -274,11 +282,13 @@ class AgentRun:
             self._outbox.send_past(self._past[run])
         for message in missing.alignments:
             self._outbox.send_alignments(message)
+            self._needs.published(now, message)
         for run in missing.marks:
             self._outbox.send_marks(marked.get(run) or self._marks.message())
         if self._orders.lacks(now):
             request_orders_of_coordinator(self._session, self._team, self._inbox.put)
-        self._outbox.answer(self._published, self._orders.message)
+        answers = {ALL_ORDERS: lambda: self._orders.message, ITS_STATUS: self._status}
+        self._outbox.answer(self._published, answers)
         for state in self._comparisons.to_ask_for(now):
             request_map(self._session, self._team, state, self._inbox.add)
 
@@ -291,6 +301,8 @@ class AgentRun:
         if not self._comparer.busy:
             comparison = self._comparisons.begin(now)
             if comparison is not None:
+                ends = comparison.reference.robot, comparison.other.robot
+                self._outbox.prepare_alignments(*ends)
                 self._comparer.start(comparison)
 
     def _publish_outcome(self, outcome: ComparisonOutcome) -> Sequence[Alignment]:
@@ -300,7 +312,9 @@ class AgentRun:
         if found is None:
             return ()
         message = message_of(self._mapper.robot, outcome.comparison, found)
-        self._outbox.send_news(message, final=self._comparisons.is_final(outcome.comparison))
+        final = self._comparisons.is_final(outcome.comparison)
+        self._outbox.send_news(message, final=final)
+        self._needs.published(time.monotonic(), message)
         self._whereabouts.met(message)
         self._state.keep_found(self._mapper.boot, self._outbox.found)
         return found
@@ -312,7 +326,9 @@ class AgentRun:
         self._tell(self._published)
         self._keep(self._published)
         self._comparisons.own_map(arrives, finished=self._finished)
-        self._publication.published(time.monotonic(), size)
+        now = time.monotonic()
+        self._publication.published(now, size)
+        self._needs.published(now)
 
     def _draw(self) -> RobotMap:
         """Return the map as it is now; what changes while it is drawn is still to be kept."""
@@ -336,7 +352,11 @@ class AgentRun:
         self._state.keep_marks(message)
 
     def _publish_status(self) -> None:
-        status = StatusMessage(
+        self._outbox.send_status(self._status())
+        self._statuses.sent(time.monotonic(), self._state_told)
+
+    def _status(self) -> StatusMessage:
+        return StatusMessage(
             robot=self._mapper.robot,
             boot=self._mapper.boot,
             stamp=time.time(),
@@ -356,8 +376,6 @@ class AgentRun:
             dropped=self._inbox.dropped,
             orders=self._orders.digest,
         )
-        self._outbox.send_status(status)
-        self._statuses.sent(time.monotonic(), self._state_told)
 
 
 def _scans_placed(robot_map: RobotMap) -> int:

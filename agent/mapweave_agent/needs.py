@@ -3,10 +3,11 @@
 No clock and no network in here.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from mapweave_protocol.link.lacking import Lacking
+from mapweave_protocol.link.lacking import GRACE, Lacking
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointStatusMessage,
@@ -14,6 +15,10 @@ from mapweave_protocol.wire.messages import (
     StatusMessage,
 )
 from mapweave_protocol.wire.pairs import is_older, states_of
+
+MAP = "map"
+ARRIVAL = 4.0  # [s] after which what was published is not on its way; Zenoh sends lost ones again
+RETURN = 10.0  # [s] after somebody came, in which it is not waited for so long: links were broken
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +46,8 @@ class Needs:
         self._coordinators: dict[str, JointStatusMessage] = {}
         self._peers: dict[str, StatusMessage] = {}
         self._here: dict[str, JointStatusMessage] = {}  # the last of each that is alive
+        self._published: dict[str, float] = {}  # when, by what
+        self._met = -math.inf
 
     def coordinator(self, status: JointStatusMessage) -> None:
         """Take in what a coordinator holds."""
@@ -49,6 +56,14 @@ class Needs:
     def coordinator_gone(self, boot: str) -> None:
         """Note that a coordinator is no longer alive."""
         self._here.pop(boot, None)
+
+    def met(self, now: float) -> None:
+        """Note that somebody came: what was published before may not have reached everybody."""
+        self._met = now
+
+    def published(self, now: float, message: AlignmentMessage | None = None) -> None:
+        """Note that the map, or a `message` of what was found, was published just `now` [s]."""
+        self._published[MAP if message is None else _pair_of(message)] = now
 
     def delivered(self, own: MapVersion | None) -> bool:
         """Tell whether every coordinator that is here has said that it holds this robot's map."""
@@ -84,8 +99,13 @@ class Needs:
         coordinators = {f"coordinator {b}": s.maps for b, s in self._coordinators.items()}
         held = coordinators | {f"{s.robot} {b}": s.holds for b, s in self._peers.items()}
         # All are asked, so that each one's time runs.
-        lacks = [own is not None and self._lacks_map(who, m, own, now) for who, m in held.items()]
-        missing = tuple(message for message in found if self._lacks_alignments(message, now))
+        sent = own is not None and self._had_time(MAP, now)
+        lacks = [sent and self._lacks_map(who, m, own, now) for who, m in held.items() if own]
+        missing = tuple(
+            message
+            for message in found
+            if self._had_time(_pair_of(message), now) and self._lacks_alignments(message, now)
+        )
         wanted = [
             run
             for run in past
@@ -103,6 +123,14 @@ class Needs:
         runs, marked = (tuple(dict.fromkeys(those)) for those in (wanted, unmarked))
         return Missing(any(lacks), runs, missing, marked)
 
+    def _had_time(self, what: str, now: float) -> bool:
+        """Tell whether what was published has had time to arrive, and those who got it to say so.
+
+        What was said before counts for nothing.
+        """
+        wait = GRACE if now - self._met < RETURN else ARRIVAL
+        return now - self._published.get(what, -math.inf) >= wait
+
     def _lacks_map(self, who: str, held: Sequence[MapVersion], own: MapVersion, now: float) -> bool:
         mine = [version for version in held if version.robot == self._robot]
         newest = next((v.version for v in mine if v.boot == own.boot), None)
@@ -110,14 +138,17 @@ class Needs:
         return self._lacking.due(f"map {who}", newest, now, lacks=lacks)
 
     def _lacks_alignments(self, message: AlignmentMessage, now: float) -> bool:
-        ours = message.reference, message.other
-        pair = " ".join(f"{end.robot}@{end.boot}" for end in ours)
+        ours, pair = (message.reference, message.other), _pair_of(message)
         due = False
         for boot, status in self._coordinators.items():
             held = _held_of_pair(status, ours)
             lacks = held is None or is_older(held, ours)
             due |= self._lacking.due(f"alignments {boot} {pair}", held, now, lacks=lacks)
         return due
+
+
+def _pair_of(message: AlignmentMessage) -> str:
+    return " ".join(f"{end.robot}@{end.boot}" for end in (message.reference, message.other))
 
 
 def _held_of_pair(

@@ -2,7 +2,7 @@
 
 import logging
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from types import TracebackType
 
@@ -25,17 +25,15 @@ from mapweave_protocol.wire.keys import AGENT_QUERY, ALIGNMENT, LIVE, MAP, MARK,
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     MarksMessage,
-    OrdersMessage,
     PoseMessage,
     StatusMessage,
     Traffic,
 )
+from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.pairs import Run, states_of
-from mapweave_protocol.wire.queries import JointQuery
+from mapweave_protocol.wire.status_message import Kind
 
 WAITING_QUERIES = 16
-KINDS = "map", "alignment", "pose", "mark", "status"
-ORDERS = JointQuery(orders="all").parameters
 
 _log = logging.getLogger(__name__)
 
@@ -61,9 +59,10 @@ class Outbox:
         self._sender = sender
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[frozenset[Run], AlignmentMessage] = {}
+        self._marks: ze.AdvancedPublisher | None = None
         self._marked: dict[str, MarksMessage] = {}
-        self._messages = Counter(dict.fromkeys(KINDS, 0))
-        self._bytes = Counter(dict.fromkeys(KINDS, 0))
+        self._messages = Counter[Kind]()
+        self._bytes = Counter[Kind]()
         self._declared = ExitStack()
 
     def __enter__(self) -> "Outbox":
@@ -74,8 +73,6 @@ class Outbox:
             status_key = STATUS.build(team=self._team, robot=self._robot)
             live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
             self._maps = keep(declare_map_publisher(self._session, map_key))
-            marks_key = MARK.build(team=self._team, robot=self._robot)
-            self._marks = keep(declare_marks_publisher(self._session, marks_key))
             pose_key = POSE.build(team=self._team, robot=self._robot)
             self._poses = keep(declare_pose_publisher(self._session, pose_key))
             self._statuses = keep(declare_status_publisher(self._session, status_key))
@@ -96,7 +93,7 @@ class Outbox:
         self._declared.close()
 
     @property
-    def sent(self) -> Mapping[str, Traffic]:
+    def sent(self) -> Mapping[Kind, Traffic]:
         """What was published so far, by kind."""
         return {
             kind: Traffic(messages=count, bytes=self._bytes[kind])
@@ -127,16 +124,29 @@ class Outbox:
 
     def send_marks(self, message: MarksMessage) -> None:
         """Publish the marks of a run of the robot, all of them."""
+        if self._marks is None:  # most robots mark nothing
+            key = MARK.build(team=self._team, robot=self._robot)
+            self._marks = declare_marks_publisher(self._session, key)
+            self._declared.enter_context(self._marks)
         self._marked[message.boot] = message
         self._put("mark", self._marks, encode(message))
 
+    def prepare_alignments(self, reference: str, other: str) -> ze.AdvancedPublisher:
+        """Return the publisher of what is found out about a pair of robots.
+
+        Whoever listens asks a publisher that is new for what it has published: it is best declared
+        while there is nothing, or the first message goes to each of them twice.
+        """
+        publisher = self._alignments.get((reference, other))
+        if publisher is None:
+            key = self._key_of(reference, other)
+            publisher = declare_alignment_publisher(self._session, key)
+            self._alignments[reference, other] = self._declared.enter_context(publisher)
+        return publisher
+
     def send_alignments(self, message: AlignmentMessage) -> None:
         """Publish what was found out about a pair of robots."""
-        pair = message.reference.robot, message.other.robot
-        publisher = self._alignments.get(pair)
-        if publisher is None:
-            publisher = declare_alignment_publisher(self._session, self._key_of(message))
-            self._alignments[pair] = self._declared.enter_context(publisher)
+        publisher = self.prepare_alignments(message.reference.robot, message.other.robot)
         self._found[frozenset(states_of((message.reference, message.other)))] = message
         self._put("alignment", publisher, encode(message))
 
@@ -163,35 +173,38 @@ class Outbox:
         """Publish where the robot is."""
         self._put("pose", self._poses, encode(message))
 
-    def answer(self, robot_map: RobotMap, orders: OrdersMessage) -> None:
+    def answer(self, robot_map: RobotMap, others: Mapping[str, Callable[[], Message]]) -> None:
         """Give who has asked the whole of `robot_map`, as published last, and what was found.
 
-        Or, who has asked for that, the `orders` of operators.
+        Or, who has asked for that, one of the `others`, by the parameters of the question.
         """
         while (query := self._asked.handler.try_recv()) is not None:
             with query:
-                self._answer(query, robot_map, orders)
+                self._answer(query, robot_map, others)
 
-    def _answer(self, query: zenoh.Query, robot_map: RobotMap, orders: OrdersMessage) -> None:
+    def _answer(
+        self, query: zenoh.Query, robot_map: RobotMap, others: Mapping[str, Callable[[], Message]]
+    ) -> None:
         parts = {"team": self._team, "robot": self._robot}
+        other = others.get(str(query.parameters))
         try:
-            if str(query.parameters) == ORDERS:
-                query.reply(AGENT_QUERY.build(**parts), encode(orders))
+            if other is not None:
+                query.reply(AGENT_QUERY.build(**parts), encode(other()))
                 return
             query.reply(MAP.build(**parts), self._sender.whole(robot_map))
             for message in self._found.values():
-                query.reply(self._key_of(message), encode(message))
+                key = self._key_of(message.reference.robot, message.other.robot)
+                query.reply(key, encode(message))
             for marks in self._marked.values():
                 query.reply(MARK.build(**parts), encode(marks))
         except zenoh.ZError as error:
             _log.warning("an answer could not be sent: %s", error)
 
-    def _key_of(self, message: AlignmentMessage) -> str:
-        reference, other = message.reference.robot, message.other.robot
+    def _key_of(self, reference: str, other: str) -> str:
         return ALIGNMENT.build(team=self._team, robot=self._robot, reference=reference, other=other)
 
     def _put(
-        self, kind: str, publisher: ze.AdvancedPublisher | zenoh.Publisher, payload: bytes
+        self, kind: Kind, publisher: ze.AdvancedPublisher | zenoh.Publisher, payload: bytes
     ) -> None:
         publisher.put(payload)
         self._messages[kind] += 1

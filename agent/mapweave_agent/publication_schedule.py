@@ -6,10 +6,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave_protocol.link.lacking import GRACE
 
+FRAME = (
+    50  # [bytes] that Zenoh adds to a message: whose it is, its number, and that it was the last
+)
 MOST_SAVED = 1000.0  # [bytes], and most that is owed: a whole map now and then is no growth
-AGAIN = GRACE + 0.5  # [s] after somebody came: what is still missing then did not arrive by itself
 
 
 class AgentParameters(BaseModel):
@@ -45,7 +46,7 @@ class AgentParameters(BaseModel):
         10.0, gt=0, description="[s] after which it is published though less was driven"
     )
     bytes_per_metre: float = Field(
-        70.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
+        60.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
     )
     bytes_per_second: float = Field(
         2.0,
@@ -53,7 +54,10 @@ class AgentParameters(BaseModel):
         description="[1/s] of maps besides: a place may change while it stands",
     )
     status_interval: float = Field(
-        10.0, gt=0, description="[s] between statuses: a slow robot drives 2 m meanwhile"
+        30.0,
+        gt=0,
+        description="[s] between statuses though nothing but progress is to be said, half of it"
+        " while a peer's map is lacking; a slow robot drives 5 m meanwhile",
     )
     least_status_interval: float = Field(
         1.0, ge=0, description="[s] after a status before the next, whatever has changed"
@@ -94,8 +98,9 @@ class PublicationSchedule:
         return self._driven >= p.map_distance or waited >= p.map_patience
 
     def published(self, now: float, size: int = 0) -> None:
-        """Note that the map has been published, in so many bytes."""
+        """Note that the map has been published, in a payload of `size` [bytes]."""
         waited = 0.0 if self._last is None else now - self._last
+        size += FRAME
         allowed = self._allowed + waited * self._parameters.bytes_per_second - size
         self._allowed = min(max(allowed, -MOST_SAVED), MOST_SAVED)
         if not self._urgent:
@@ -119,33 +124,3 @@ class RegularSchedule:
     def done(self, now: float) -> None:
         """Note that it was done."""
         self._last = now
-
-
-class StatusSchedule:
-    """When to say how one is: when something has changed, when somebody comes, and now and then."""
-
-    def __init__(self, parameters: AgentParameters) -> None:
-        self._parameters = parameters
-        self._said: object = None
-        self._last = -math.inf
-        self._heard_again = -math.inf
-
-    def met(self, now: float) -> None:
-        """Note that somebody came or went: who was away hears at once what is here, and again.
-
-        The second time tells whether what the first one said was missing is still on its way.
-        """
-        self._last = min(self._last, now - self._parameters.status_interval)
-        self._heard_again = now + AGAIN
-
-    def due(self, now: float, state: object) -> bool:
-        """Tell whether a status is to be sent; `state` is what others are told of at once."""
-        waited = now - self._last
-        if waited < self._parameters.least_status_interval:
-            return False
-        again = self._last < self._heard_again <= now
-        return again or state != self._said or waited >= self._parameters.status_interval
-
-    def sent(self, now: float, state: object) -> None:
-        """Note that a status was sent."""
-        self._last, self._said = now, state

@@ -167,6 +167,7 @@ def drive(folder: Path, options: argparse.Namespace, events: int) -> Result:
         disturbances = Disturbances(trial, options.seed)
         for _ in range(events):
             disturbances.befall()
+            print(f"{len(disturbances.told)}: {disturbances.told[-1]}", flush=True)
         for robot in trial.plan.robots:
             until(lambda robot=robot: _parked(trial, robot), f"{robot} to park")  # type: ignore[misc]
         until(lambda: time.monotonic() - heard.since > QUIET, "the last version")
@@ -280,7 +281,6 @@ def run(options: argparse.Namespace) -> None:
         ]
         for name, r in results.items()
     ]
-    print("\n".join(disturbed.events))
     print(format_table(["team", "events", "runs", "versions", "joint components"], rows))
     print("\n".join(wrong))
     print(f"differences: {len(wrong)}, bar: none (of {DISTANCE:g} m, {np.degrees(ANGLE):.0f} deg)")

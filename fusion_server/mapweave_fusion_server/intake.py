@@ -97,6 +97,12 @@ class Intake:
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
         self._warned_of_orders = False
+        self._met = False
+
+    def met(self) -> bool:
+        """Tell whether a robot or another coordinator came since this was asked the last time."""
+        met, self._met = self._met, False
+        return met
 
     @property
     def refused(self) -> int:
@@ -160,9 +166,11 @@ class Intake:
             return
         elif (coordinator := read_coordinator(arrival, self.refusals)) is not None:
             boot, here = coordinator
+            self._met |= here
             record(self._story.coordinator(boot, here=here))
         elif (presence := read_presence(arrival, self.refusals)) is not None:
             self._note(presence.robot)
+            self._met |= presence.here
             change = self._story.appeared if presence.here else self._story.left
             record(change(presence.robot, presence.boot))
 

@@ -19,10 +19,11 @@ from mapweave_fusion_server.storage.database import UnwritableError
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
 from mapweave_protocol.link import session
-from mapweave_protocol.link.asking import request_all_of, request_orders_of
+from mapweave_protocol.link.asking import ITS_STATUS, request_all_of, request_orders_of
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.joint_changes import JointSender
+from mapweave_protocol.link.status_schedule import COORDINATOR_INTERVAL, StatusSchedule
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import decode, encode
@@ -32,7 +33,8 @@ from mapweave_protocol.wire.messages import JointMapMessage, JointStatusMessage
 POLL = 0.1  # [s] after which a signal, or a version that is ready, is noticed
 ANSWERERS = 4  # one slow asker must not keep the others waiting
 WAITING_QUERIES = 256
-STATUS_INTERVAL = 1.0  # [s]
+LEAST_STATUS_INTERVAL = 1.0  # [s], whatever has changed
+REPORT_INTERVAL = 1.0  # [s] between two reports on the live page
 RUNS_MARKED = 16  # of a robot whose marks come from its publisher's cache
 
 _log = logging.getLogger(__name__)
@@ -83,7 +85,9 @@ class Service:
         self._inbox = Inbox()
         self._joints = JointSender()
         self._boot = keys.new_boot()
-        self._status_due = 0.0
+        self._speaking = StatusSchedule(COORDINATOR_INTERVAL, LEAST_STATUS_INTERVAL)
+        self._report_due = self._look_due = 0.0
+        self._latest: JointStatusMessage | None = None
         self._builder = VersionBuilder(store.series, config or Config())
         self._covers = 0
         self._started = time.time()
@@ -124,10 +128,11 @@ class Service:
             request_all_of(self._session, self._team, robot, self._inbox.put)
         for robot in orders_of:
             request_orders_of(self._session, self._team, robot, self._inbox.put)
-        if now >= self._status_due:
-            self._resume_storing()
-            self._publish_status()
-            self._status_due = now + STATUS_INTERVAL
+        if self._intake.met():
+            self._speaking.met(now)
+        if now >= self._look_due:
+            self._look_due = now + POLL
+            self._say_how_it_is(now)
 
     def _take_orders_of_page(self) -> None:
         """Take what was ordered on the live page, and say it to those who keep orders as well."""
@@ -159,7 +164,8 @@ class Service:
             kept = decode(JointMapMessage, self._keep(built))
             self._publisher.put(self._joints.payload(kept))
             self._frames = frames_of(built.joint)
-            self._status_due = 0.0  # robots wait for their new frames
+            self._look_due = 0.0
+            self._speaking.hurry()  # robots wait for their new frames
             self._feed.show_version(built.draft.version, built.draft.maps)
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
@@ -188,8 +194,21 @@ class Service:
             self._publisher.put(self._joints.payload(decode(JointMapMessage, latest)))
             _log.info("version %d published again", self._store.latest_version)
 
-    def _publish_status(self) -> None:
-        status = JointStatusMessage(
+    def _say_how_it_is(self, now: float) -> None:
+        """Tell the team where that is due, and the live page every second."""
+        self._latest = status = self._status()
+        # That a version is being made is said by the version.
+        told = status.model_copy(update={"stamp": 0.0, "pending": False})
+        if self._speaking.due(now, told):
+            self._statuses.put(encode(status))
+            self._speaking.sent(now, told)
+        if now >= self._report_due:
+            self._report_due = now + REPORT_INTERVAL
+            self._resume_storing()
+            self._report(status)
+
+    def _status(self) -> JointStatusMessage:
+        return JointStatusMessage(
             boot=self._boot,
             stamp=time.time(),
             series=self._store.series,
@@ -204,7 +223,8 @@ class Service:
             dropped=self._inbox.dropped,
             stored=self._store.is_storing,
         )
-        self._statuses.put(encode(status))
+
+    def _report(self, status: JointStatusMessage) -> None:
         self._feed.show_team(
             self._intake.reports,
             CoordinatorReport(
@@ -282,6 +302,10 @@ class Service:
 
     def _answer(self, key: str, query: zenoh.Query) -> None:
         try:
+            if str(query.parameters) == ITS_STATUS:
+                if self._latest is not None:
+                    query.reply(key, encode(self._latest))
+                return
             for payload in answer(self._store, str(query.parameters)):
                 query.reply(key, payload)
         except MapweaveError as error:

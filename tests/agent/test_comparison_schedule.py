@@ -10,10 +10,8 @@ from mapweave.maps import Alignment, Decision, LineMap, RobotMap, Submap, Trajec
 from mapweave.reasons import Reason
 from mapweave_agent.comparison_schedule import Comparison, ComparisonSchedule
 from mapweave_agent.publication_schedule import (
-    AGAIN,
     AgentParameters,
     PublicationSchedule,
-    StatusSchedule,
 )
 from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.wire.joint_status_message import Place
@@ -319,7 +317,7 @@ def test_growth_waits_until_the_way_has_paid_for_it() -> None:
     plan.hurry()  # what has settled does not wait
     assert plan.due(4.0)
     plan.published(4.0, size=100)
-    drive(plan, 4.5, 20.0)
+    drive(plan, 4.5, 25.0)
     assert plan.due(6.0)
 
 
@@ -329,28 +327,6 @@ def test_a_leap_into_another_component_is_no_way_driven() -> None:
     drive(plan, 0.0, 0.5)
     drive(plan, 100.0, 100.5, component=1)
     assert not plan.due(5.0)
-
-
-def test_a_status_is_sent_on_a_change_and_now_and_then() -> None:
-    statuses = StatusSchedule(AgentParameters())
-    assert statuses.due(0.0, "mapping")
-    statuses.sent(0.0, "mapping")
-    assert not statuses.due(9.9, "mapping")
-    assert statuses.due(10.0, "mapping")
-    assert not statuses.due(0.9, "finished")
-    assert statuses.due(1.0, "finished")
-
-
-def test_whoever_comes_hears_at_once_and_when_what_was_missing_should_have_come() -> None:
-    statuses = StatusSchedule(AgentParameters())
-    statuses.sent(0.0, "mapping")
-    statuses.met(1.0)
-    assert statuses.due(1.0, "mapping")
-    statuses.sent(1.0, "mapping")
-    assert not statuses.due(0.9 + AGAIN, "mapping")
-    assert statuses.due(1.0 + AGAIN, "mapping")
-    statuses.sent(1.0 + AGAIN, "mapping")
-    assert not statuses.due(10.9 + AGAIN, "mapping")
 
 
 def joined(*names: str) -> JointStatusMessage:

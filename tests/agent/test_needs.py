@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import pytest
 
-from mapweave_agent.needs import Missing, Needs
+from mapweave_agent.needs import ARRIVAL, RETURN, Missing, Needs
 from mapweave_protocol.link.lacking import GRACE
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
@@ -65,6 +65,30 @@ def test_who_has_not_the_latest_map_gets_it(who: Holder, held: tuple[MapVersion,
 
 def test_nothing_is_sent_again_while_it_may_be_on_its_way() -> None:
     assert asked_twice(coordinator(), state("a", 7), pause=GRACE / 2) == NOTHING
+
+
+def asked_after_publication(came: float) -> float:
+    """Return after how long a map that never arrives is sent again, somebody coming at `came`."""
+    needs, now = Needs("a"), 0.0
+    needs.met(came)
+    needs.published(now)
+    needs.published(now, found(7, 3))
+    while now < 60.0:
+        needs.coordinator(coordinator())
+        missing = needs.missing(state("a", 7), [found(7, 3)], now)
+        assert missing.map == bool(missing.alignments)
+        if missing.map:
+            return now
+        now += GRACE / 8
+    pytest.fail("never")
+
+
+def test_what_was_published_on_links_that_hold_is_given_time_to_be_told_of() -> None:
+    assert asked_after_publication(came=-RETURN) == pytest.approx(ARRIVAL + GRACE, abs=GRACE / 4)
+
+
+def test_after_links_were_broken_what_was_published_before_is_sent_again_soon() -> None:
+    assert asked_after_publication(came=0.0) == pytest.approx(2 * GRACE, abs=GRACE / 4)
 
 
 @pytest.mark.parametrize("who", [coordinator, peer])

@@ -1,7 +1,7 @@
 """Questions to the coordinator, answered from its store."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
 import zenoh
@@ -10,7 +10,7 @@ from mapweave.maps import parse_component
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.wire.codec import decode
-from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY, MAP
+from mapweave_protocol.wire.keys import AGENT_QUERY, JOINT_QUERY, JOINT_STATUS, MAP, STATUS
 from mapweave_protocol.wire.messages import (
     JointMapMessage,
     MapMessage,
@@ -25,8 +25,10 @@ from mapweave_protocol.wire.queries import JointQuery
 
 ANSWER_WITHIN = 5.0  # [s]
 ALL_ORDERS = JointQuery(orders="all").parameters
+ITS_STATUS = JointQuery(of="status").parameters
 
 M = TypeVar("M", bound=Message)
+T = TypeVar("T")
 _log = logging.getLogger(__name__)
 
 
@@ -104,7 +106,7 @@ def ask_runs(
         If the answer is not valid.
     """
     answers = _ask(session, team, JointQuery(runs="all"), RunsMessage, timeout)
-    return [run for message in answers for run in message.runs] if answers else None
+    return _together(message.runs for message in answers)
 
 
 def ask_orders(
@@ -118,7 +120,35 @@ def ask_orders(
         If the answer is not valid.
     """
     answers = _ask(session, team, JointQuery(orders="all"), OrdersMessage, timeout)
-    return [order for message in answers for order in message.orders] if answers else None
+    return _together(message.orders for message in answers)
+
+
+def _together(answers: Iterable[Iterable[T]]) -> list[T] | None:
+    """Return what all `answers` have; None if there are none."""
+    parts = list(answers)
+    return [one for part in parts for one in part] if parts else None
+
+
+def request_statuses(
+    session: zenoh.Session, team: str, take: Callable[[Arrival], None], *, coordinator: bool = False
+) -> None:
+    """Ask how all robots are, or the `coordinator`; each comes as if it had just said so.
+
+    Parameters
+    ----------
+    take
+        Called in a thread of Zenoh's.
+    """
+    asked = JOINT_QUERY if coordinator else AGENT_QUERY
+
+    def take_reply(reply: zenoh.Reply) -> None:
+        if not reply.ok:
+            return
+        parts = asked.parse(str(reply.ok.key_expr))
+        key = JOINT_STATUS.build(**parts) if coordinator else STATUS.build(**parts)
+        take(Arrival(key, reply.ok.payload.to_bytes()))
+
+    _request(session, f"{asked.pattern(team=team)}?{ITS_STATUS}", take_reply)
 
 
 def request_orders_of(
@@ -131,14 +161,15 @@ def request_orders_of(
     on_sample
         Called in a thread of Zenoh's.
     """
-    _request(session, f"{AGENT_QUERY.build(team=team, robot=robot)}?{ALL_ORDERS}", on_sample)
+    selector = f"{AGENT_QUERY.build(team=team, robot=robot)}?{ALL_ORDERS}"
+    _request(session, selector, _good(on_sample))
 
 
 def request_orders_of_coordinator(
     session: zenoh.Session, team: str, on_sample: Callable[[zenoh.Sample], None]
 ) -> None:
     """Ask the coordinator for the orders that it holds; else as `request_orders_of`."""
-    _request(session, f"{JOINT_QUERY.build(team=team)}?{ALL_ORDERS}", on_sample)
+    _request(session, f"{JOINT_QUERY.build(team=team)}?{ALL_ORDERS}", _good(on_sample))
 
 
 def request_all_of(
@@ -153,22 +184,28 @@ def request_all_of(
     """
     # Zenoh says so by a parameter of its own, `_anyke`: not where we have some.
     under_any = zenoh.ReplyKeyExpr.ANY
-    _request(session, AGENT_QUERY.build(team=team, robot=robot), on_sample, under_any)
+    _request(session, AGENT_QUERY.build(team=team, robot=robot), _good(on_sample), under_any)
+
+
+def _good(on_sample: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Reply], None]:
+    """Return what hands over replies that are no errors."""
+
+    def take_reply(reply: zenoh.Reply) -> None:
+        if reply.ok:
+            on_sample(reply.ok)
+
+    return take_reply
 
 
 def _request(
     session: zenoh.Session,
     selector: str,
-    on_sample: Callable[[zenoh.Sample], None],
+    take_reply: Callable[[zenoh.Reply], None],
     accepted: zenoh.ReplyKeyExpr = zenoh.ReplyKeyExpr.MATCHING_QUERY,
 ) -> None:
-    def take(reply: zenoh.Reply) -> None:
-        if reply.ok:
-            on_sample(reply.ok)
-
     session.get(
         selector,
-        take,
+        take_reply,
         consolidation=zenoh.ConsolidationMode.NONE,
         accept_replies=accepted,
         timeout=ANSWER_WITHIN,
@@ -192,12 +229,7 @@ def request_map(
         if reply.ok:
             take(Arrival(key, reply.ok.payload.to_bytes()))
 
-    session.get(
-        f"{JOINT_QUERY.build(team=team)}?{query.parameters}",
-        take_reply,
-        consolidation=zenoh.ConsolidationMode.NONE,
-        timeout=ANSWER_WITHIN,
-    )
+    _request(session, f"{JOINT_QUERY.build(team=team)}?{query.parameters}", take_reply)
 
 
 def ask_for_what_is_valid(

@@ -17,7 +17,7 @@ from mapweave.errors import ArgumentError
 from mapweave.geometry.arguments import as_positive
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.asking import ask_for_what_is_valid, ask_latest
+from mapweave_protocol.link.asking import ask_for_what_is_valid, ask_latest, request_statuses
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import (
     Arrival,
@@ -159,8 +159,9 @@ def statuses(
     timeout: float | None = None,
     link: LinkSettings | None = None,
 ) -> Iterator[StatusMessage]:
-    """Yield the robots' statuses; as for `joint_maps`."""
-    with _listening(STATUS.pattern(team=team), connect, timeout, 1, link) as (_, inbox):
+    """Yield the robots' statuses: how each is now, then what each says; as for `joint_maps`."""
+    with _listening(STATUS.pattern(team=team), connect, timeout, 1, link) as (session, inbox):
+        request_statuses(session, team, inbox.add)
         yield from filter(None, _read(status_reader(), inbox.get, timeout))
 
 

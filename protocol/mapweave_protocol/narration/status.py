@@ -15,6 +15,7 @@ from rich.text import Text
 
 from mapweave.cli import EXIT_FAILED, Command, argument, positive
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.asking import request_statuses
 from mapweave_protocol.link.guard.refusals import Refusals
 from mapweave_protocol.link.inbox import (
     Arrival,
@@ -28,7 +29,7 @@ from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.keys import COORDINATOR_LIVE, JOINT_STATUS, LIVE, STATUS
 from mapweave_protocol.wire.messages import JointStatusMessage, StatusMessage
 
-LISTENED = 2.5  # [s]: everybody says how it is once a second
+LISTENED = 1.5  # [s] for everybody to answer; a robot does between two scans
 COLUMNS = ("", "here", "state", "scans", "map", "behind", "peers' maps", "sent", "refused", "lost")
 
 
@@ -72,6 +73,8 @@ def listen(session: zenoh.Session, team: str, seconds: float) -> Team:
             stack.enter_context(tokens.declare_subscriber(key, inbox.put, history=True))
         for key in (STATUS.pattern(team=team), JOINT_STATUS.build(team=team)):
             stack.enter_context(session.declare_subscriber(key, inbox.put))
+        for coordinator in (False, True):
+            request_statuses(session, team, inbox.add, coordinator=coordinator)
         take = _Listener(heard).take
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:

@@ -1,7 +1,8 @@
 """How two robots' maps lie to each other, as a message."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -27,6 +28,11 @@ from mapweave_protocol.wire.model import (
 )
 
 MAX_EVIDENCE = 64
+EVIDENCE = tuple(field.name for field in fields(Evidence))
+OF_REASONS = (
+    "common", "contradicted", "distance", "turn", "rival_common", "rival_contradicted", "outside",
+    "confidence", "min_wall", "parts", "spread", "reach", "tolerance",
+)  # fmt: skip
 
 
 class MapVersion(WireModel):
@@ -45,6 +51,8 @@ class MapVersion(WireModel):
 class WireRunnerUp(WireModel):
     """The best different hypothesis."""
 
+    placed: ClassVar[Mapping[str, Sequence[str]]] = {"numbers": ("distance", "turn", *EVIDENCE)}
+
     transform: Transform
     numbers: dict[Label, Number] = Field(max_length=MAX_EVIDENCE)
 
@@ -61,6 +69,8 @@ class WireRunnerUp(WireModel):
 
 class WireReason(WireModel):
     """Why an alignment was decided as it was."""
+
+    placed: ClassVar[Mapping[str, Sequence[str]]] = {"numbers": OF_REASONS}
 
     kind: Annotated[ReasonKind, Field(strict=False)]  # on the wire it is its name
     numbers: dict[Label, float] = Field(max_length=MAX_EVIDENCE)
@@ -96,6 +106,8 @@ class WireReason(WireModel):
 
 class WireAlignment(WireModel):
     """An alignment of two components."""
+
+    placed: ClassVar[Mapping[str, Sequence[str]]] = {"evidence": EVIDENCE}
 
     reference: ComponentName
     other: ComponentName

@@ -7,6 +7,7 @@ decoding gives a valid message or raises `MessageError`, and allocates no more t
 of what came (`budget`).
 """
 
+import re
 import zlib
 from decimal import Decimal
 from typing import TypeVar
@@ -25,6 +26,8 @@ MAX_PAYLOAD = 16 * MIB  # of any kind
 PLAIN, DEFLATED = b"\0", b"\1"
 _HEAD = len(MAGIC) + 3
 _MAX_EXPONENT = 40
+_BOOT = 100  # the type of an extension that is 8 hexadecimal digits, such as name runs
+_HEXADECIMAL = re.compile(r"[0-9a-f]{8}")
 _EARLIER = (0x83,)  # a msgpack map of three, which versions 1 and 2 began with
 
 M = TypeVar("M", bound=Message)
@@ -38,7 +41,7 @@ def encode(message: Message) -> bytes:
     MessageError
         If it is too large to be sent.
     """
-    body: bytes = msgpack.packb(_decimals(message.values()))
+    body: bytes = msgpack.packb(_extended(message.values()))
     packer = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=DICTIONARY)
     deflated = packer.compress(body) + packer.flush()
     budget = message.budget
@@ -120,7 +123,7 @@ def _unpack(kind: type[Message], data: bytes, most: int) -> object:
             max_array_len=MAX_ALIGNMENTS,
             max_map_len=MAX_ALIGNMENTS,
             max_ext_len=4,
-            ext_hook=_decimal,
+            ext_hook=_unextended,
         )
     # msgpack raises ValueError and its subclasses for all damage, TypeError for unhashable keys.
     except (ValueError, TypeError) as error:
@@ -129,19 +132,24 @@ def _unpack(kind: type[Message], data: bytes, most: int) -> object:
         ) from error
 
 
-def _decimals(value: object) -> object:
-    """Return `value` with floats of few digits as extensions: the exponent, and the digits."""
+def _extended(value: object) -> object:
+    """Return `value` with floats of few digits as extensions: the exponent, and the digits.
+
+    So is a string of 8 hexadecimal digits.
+    """
     match value:
         case dict():
-            return {key: _decimals(item) for key, item in value.items()}
+            return {key: _extended(item) for key, item in value.items()}
         case tuple():
-            return tuple(_decimals(item) for item in value)
+            return tuple(_extended(item) for item in value)
         case float():
-            return _extension(value)
+            return _decimal(value)
+        case str() if _HEXADECIMAL.fullmatch(value):
+            return msgpack.ExtType(_BOOT, bytes.fromhex(value))
     return value
 
 
-def _extension(value: float) -> object:
+def _decimal(value: float) -> object:
     sign, digits, exponent = Decimal(repr(value)).as_tuple()
     if not isinstance(exponent, int) or not -_MAX_EXPONENT <= exponent <= _MAX_EXPONENT:
         return value
@@ -152,7 +160,9 @@ def _extension(value: float) -> object:
     return msgpack.ExtType(exponent + _MAX_EXPONENT, number.to_bytes(size, "little", signed=True))
 
 
-def _decimal(code: int, data: bytes) -> float:
+def _unextended(code: int, data: bytes) -> float | str:
+    if code == _BOOT and len(data) == 4:
+        return data.hex()
     if not 0 <= code <= 2 * _MAX_EXPONENT:
         raise ValueError("an extension that is no number")
     return float(f"{int.from_bytes(data, 'little', signed=True)}e{code - _MAX_EXPONENT}")

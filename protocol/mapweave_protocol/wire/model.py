@@ -1,6 +1,7 @@
 """What all messages have in common, and the kinds of names and numbers in them."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -42,7 +43,7 @@ class WireModel(BaseModel):
     """Part of a message: exactly these fields, of exactly these types.
 
     On the wire it is an array of the values, in the order of the fields; those at the end that are
-    as by default may be left off.
+    as by default may be left off. So is a dictionary whose names are known (`placed`).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -54,18 +55,27 @@ class WireModel(BaseModel):
             return fields
         if len(fields) > len(cls.model_fields):
             raise ValueError(f"{len(fields)} values, expected at most {len(cls.model_fields)}")
-        return dict(zip(cls.model_fields, fields, strict=False))
+        return {
+            name: by_name(cls.placed[name], value) if name in cls.placed else value
+            for name, value in zip(cls.model_fields, fields, strict=False)
+        }
+
+    placed: ClassVar[Mapping[str, Sequence[str]]] = {}
+    """By field that is a dictionary, the names in it that need not travel."""
 
     def values(self) -> tuple[object, ...]:
         """Return the values of the fields, in their order, as they travel."""
         fields = type(self).model_fields.items()
-        values = [(getattr(self, name), field) for name, field in fields]
-        while values and not values[-1][1].is_required():
-            value, field = values[-1]
+        values = [(name, getattr(self, name), field) for name, field in fields]
+        while values and not values[-1][2].is_required():
+            _, value, field = values[-1]
             if value != field.get_default(call_default_factory=True):
                 break
             values.pop()
-        return tuple(_plain(value) for value, _ in values)
+        return tuple(
+            _plain(by_place(self.placed[name], value) if name in self.placed else value)
+            for name, value, _ in values
+        )
 
 
 class Message(WireModel):
@@ -80,6 +90,25 @@ def to_transform(pose: FloatArray) -> Transform:
     """Return the ``(3,)`` `pose` [m, m, rad] as plain numbers, of no more digits than matter."""
     x, y, theta = (float(number) for number in pose)
     return round(x, 4), round(y, 4), round(theta, 6)
+
+
+def by_place(names: Sequence[str], known: Mapping[str, object]) -> object:
+    """Return what is `known` as it travels: each at the place of its name in `names`.
+
+    Nothing stands where nothing is known; under other names all of it travels by name.
+    """
+    if not known or not known.keys() <= set(names):
+        return dict(known)
+    last = max(names.index(name) for name in known)
+    return tuple(known.get(name) for name in names[: last + 1])
+
+
+def by_name(names: Sequence[str], travelled: object) -> object:
+    """Return what `by_place` gave by name; anything else as it is."""
+    if not isinstance(travelled, tuple) or len(travelled) > len(names):
+        return travelled
+    pairs = zip(names, travelled, strict=False)
+    return {name: value for name, value in pairs if value is not None}
 
 
 def _plain(value: object) -> object:

@@ -5,7 +5,8 @@ Replies, one sample each, on the same key: to none and ``version=N`` a `JointMap
 ``robot=ID`` and ``component=ID/K`` a complete `MapMessage` (of the robot's last run, or of that
 with ``boot=BOOT``), to ``of=maps`` those of all runs, to ``of=alignments`` an `AlignmentMessage` of
 each pair of runs, with ``since=N`` only what is not in version N; to ``runs=all`` a `RunsMessage`,
-to ``orders=all`` an `OrdersMessage`, which agents give as well.
+to ``orders=all`` an `OrdersMessage`, to ``of=status`` a `JointStatusMessage`. Agents answer the
+last two as well, to ``of=status`` by a `StatusMessage`.
 """
 
 import re
@@ -20,7 +21,7 @@ _NUMBER = re.compile(r"[0-9]{1,15}")
 _COUNTED = {"version", "since", "limit"}
 _EXPECTED = (
     "version=N, since=N, since=N;limit=K, robot=ID, robot=ID;boot=BOOT, component=ID/K, of=maps,"
-    " of=alignments, since=N;of=maps, since=N;of=alignments, runs=all, orders=all"
+    " of=alignments, since=N;of=maps, since=N;of=alignments, of=status, runs=all, orders=all"
 )
 _BESIDE = {"limit": "since", "boot": "robot"}  # what refines another question
 
@@ -57,7 +58,7 @@ class JointQuery(BaseModel):
     limit: int | None = Field(default=None, ge=1, le=2**53)
     robot: Id | None = Field(default=None)
     boot: Id | None = Field(default=None)
-    of: Literal["maps", "alignments"] | None = Field(default=None)
+    of: Literal["maps", "alignments", "status"] | None = Field(default=None)
     component: ComponentName | None = Field(default=None)
     runs: Literal["all"] | None = Field(default=None)
     orders: Literal["all"] | None = Field(default=None)
@@ -67,6 +68,8 @@ class JointQuery(BaseModel):
         given = self._given().keys()
         if len(given - _BESIDE.keys()) > 1 and given != {"since", "of"}:
             raise ValueError("expected one question")
+        if "since" in given and self.of == "status":
+            raise ValueError("since, expected beside maps or alignments only")
         for name, other in _BESIDE.items():
             if name in given and other not in given:
                 raise ValueError(f"{name}, expected beside {other} only")

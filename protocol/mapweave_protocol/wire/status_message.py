@@ -1,6 +1,7 @@
 """How far a robot is, as a message."""
 
-from typing import ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Literal, TypeAlias, get_args
 
 from pydantic import Field
 
@@ -28,6 +29,10 @@ class Traffic(WireModel):
     bytes: Count
 
 
+Kind: TypeAlias = Literal["map", "alignment", "status", "pose", "mark"]
+"""What a robot publishes."""
+
+
 class StatusMessage(Message):
     """How far a robot is.
 
@@ -46,7 +51,7 @@ class StatusMessage(Message):
     holds
         Which state of each peer's map is held.
     sent
-        By kind of message: ``map``, ``alignment``, ``pose``, ``mark``, ``status``.
+        What was published, by kind of message.
     orders
         Tells apart which orders of operators are held; nothing where none are.
     refused
@@ -58,6 +63,7 @@ class StatusMessage(Message):
     letter: ClassVar[bytes] = b"s"
     format: ClassVar[str] = "status"
     budget: ClassVar[Budget] = Budget(256 * KIB, 2 * MIB, 30_000)
+    placed: ClassVar[Mapping[str, Sequence[str]]] = {"sent": get_args(Kind)}
 
     robot: Id
     boot: Id
@@ -73,7 +79,7 @@ class StatusMessage(Message):
     map_version: Count
     compared: dict[Id, Compared] = Field(default_factory=dict, max_length=MAX_PEERS)
     holds: tuple[MapVersion, ...] = Field(default=(), max_length=MAX_PEERS)
-    sent: dict[Label, Traffic] = Field(default_factory=dict, max_length=16)
+    sent: dict[Kind, Traffic] = Field(default_factory=dict)
     orders: bytes = Field(default=b"", max_length=DIGEST_SIZE)
     refused: dict[Label, Count] = Field(default_factory=dict, max_length=MAX_REFUSED)
     dropped: Count = 0

@@ -1,7 +1,5 @@
 """What was marked and ordered is lost with no process: others keep it as well."""
 
-import os
-import subprocess
 import time
 from pathlib import Path
 
@@ -9,19 +7,17 @@ import numpy as np
 import pytest
 
 import mapweave_agent
-import mapweave_protocol
 from mapweave.geometry import se2
 from mapweave.io.map_files import write_map
 from mapweave.io.readers import read_scans
 from mapweave.mapping.mapper import Mapper
-from mapweave.maps import JointMap
 from mapweave.marks import PlacedMark
 from mapweave_deploy.run.launcher import Plan, start_agent, start_router, start_server
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.team_plan import Member
 from mapweave_deploy.sim.simulation import simulate
-from tests.agent.test_agent import MAPWEAVE
 from tests.deploy.run.test_outages import PATIENCE, child, end, plan_of, says, until
+from tests.people import Operator
 
 SCANS = 60
 VICTIM = np.array([1.5, 0.5])  # [m] from the sensor at the last scan
@@ -37,28 +33,12 @@ def member(robot: str, log: Path) -> Member:
     return Member(robot, log, (0, SCANS), "arena", np.empty(0, dtype=np.int64), np.empty((0, 3)))
 
 
-def orders(plan: Plan, *words: str) -> str:
-    """Return what ``mapweave`` says to these words."""
-    where = ["--team", plan.team, "--connect", plan.listen]
-    done = subprocess.run(
-        [MAPWEAVE, *words, *where],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE,
-        env={**os.environ, "MAPWEAVE_OPERATOR": "anna"},
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def latest(plan: Plan) -> JointMap | None:
-    maps = mapweave_protocol.joint_maps(plan.team, connect=[plan.listen], timeout=5.0)
-    return next(maps, None)
+def anna(plan: Plan) -> Operator:
+    return Operator(plan.team, plan.listen, "anna")
 
 
 def marks(plan: Plan) -> dict[str, PlacedMark]:
-    joint = latest(plan)
+    joint = anna(plan).sees()
     components = () if joint is None else joint.components
     return {mark.label: mark for component in components for mark in component.marks}
 
@@ -124,10 +104,10 @@ def test_a_coordinator_that_lost_everything_gets_orders_back_from_a_robot_that_h
         start_server(crew, plan, plan.store)
         start_agent(crew, plan, r1)
         until(lambda: says(tmp_path, "agent-r1", "finished: "))
-        until(lambda: latest(plan) is not None)
-        orders(plan, "mark", "r1", "exit", "--at", "5")
-        orders(plan, "mark", "r1", "mistake", "--at", "6")
-        orders(plan, "mark", "r1", "mistake", "--undo")
+        until(lambda: anna(plan).sees() is not None)
+        anna(plan).orders("mark", "r1", "exit", "--at", "5")
+        anna(plan).orders("mark", "r1", "mistake", "--at", "6")
+        anna(plan).orders("mark", "r1", "mistake", "--undo")
         until(lambda: set(marks(plan)) == {"exit"})
         # The robot is started again meanwhile: it has them on its disk.
         end(crew, child(crew, "agent r1"))
@@ -149,10 +129,10 @@ def test_a_robot_that_was_away_learns_what_was_ordered_and_keeps_it(
         start_router(crew, plan)
         start_server(crew, plan, plan.store)
         start_agent(crew, plan, r1)
-        until(lambda: latest(plan) is not None)
+        until(lambda: anna(plan).sees() is not None)
         until(lambda: says(tmp_path, "agent-r1", "finished: "))
         end(crew, child(crew, "agent r1"))
-        orders(plan, "mark", "r1", "exit", "--at", "5")
+        anna(plan).orders("mark", "r1", "exit", "--at", "5")
         assert not (plan.states / "r1" / "orders").exists()
         start_agent(crew, plan, r1)
         until(lambda: (plan.states / "r1" / "orders").exists())
@@ -173,22 +153,22 @@ def test_a_finished_map_is_delivered_joined_and_kept_when_its_sender_is_gone(
         start_server(crew, plan, plan.store)
         start_agent(crew, plan, r1)
         until(lambda: says(tmp_path, "agent-r1", "finished: "))
-        until(lambda: latest(plan) is not None)
+        until(lambda: anna(plan).sees() is not None)
         end(crew, child(crew, "agent r1"))
-        said = orders(plan, "send", str(tmp_path / "r9.json"))
+        said = anna(plan).orders("send", str(tmp_path / "r9.json"))
         assert said.startswith("delivered: r9/0, run ")
         assert "r1/0 - r9/0: accepted" in said
         until(lambda: together(plan) == {("r1/0", "r9/0")})
-        again = orders(plan, "send", str(tmp_path / "r9.json"))  # the same run, once
+        again = anna(plan).orders("send", str(tmp_path / "r9.json"))  # the same run, once
         assert again.splitlines()[0] == said.splitlines()[0]
         end(crew, child(crew, "server"))
         start_server(crew, plan, plan.store)
         until(lambda: together(plan) == {("r1/0", "r9/0")})
-        other = orders(plan, "send", str(tmp_path / "r9.json"), "--robot", "r1")
+        other = anna(plan).orders("send", str(tmp_path / "r9.json"), "--robot", "r1")
         assert other.startswith("delivered: r1/1, run ")
 
 
 def together(plan: Plan) -> set[tuple[str, ...]]:
-    joint = latest(plan)
+    joint = anna(plan).sees()
     components = () if joint is None else joint.components
     return {tuple(sorted(component.robots)) for component in components}

@@ -1,63 +1,24 @@
 """What a person types, at a real server with robots made by hand."""
 
-import os
 import subprocess
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 import pytest
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.maps import JointMap, LineMap, RobotMap, Submap, Trajectory
-from mapweave_protocol.link.asking import ask_latest
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from tests.fusion_server.conftest import L_ROOM, MAPWEAVE, PATIENCE, Network
+from tests.people import Operator
 
 SCANS = 5  # of a submap
-
-
-@dataclass(frozen=True)
-class Operator:
-    """Somebody at a terminal."""
-
-    network: Network
-    name: str
-
-    def types(self, *words: str) -> subprocess.CompletedProcess[str]:
-        """Run ``mapweave`` with these words, and say which team and router are meant."""
-        where = ["--team", self.network.team, "--connect", self.network.endpoint]
-        return subprocess.run(
-            [MAPWEAVE, *words, *where],
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=PATIENCE,
-            env={**os.environ, "MAPWEAVE_OPERATOR": self.name},
-        )
-
-    def orders(self, *words: str) -> str:
-        """As `types`, and it succeeds; return what was said."""
-        done = self.types(*words)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    def latest(self) -> JointMap:
-        """Return the latest joint map."""
-        message, _ = ask_latest(self.network.connect(), self.network.team)
-        assert message is not None
-        return message.unpack()
-
-
-Type: TypeAlias = Callable[..., Operator]
 
 
 @pytest.fixture
 def anna(network: Network) -> Operator:
     """Return an operator called anna."""
-    return Operator(network, "anna")
+    return Operator(network.team, network.endpoint, "anna")
 
 
 def walk(

@@ -11,8 +11,9 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import read_joint, write_joint
 from mapweave.maps import JointMap
-from tests.fusion_server.by_hand.conftest import Operator, exported, walk
+from tests.fusion_server.by_hand.conftest import exported, walk
 from tests.fusion_server.conftest import MakeAlignments, Network, StartServer
+from tests.people import Operator
 
 START_A, START_B = (1.0, 1.0, 0.3), (3.0, 2.0, 1.0)
 SECOND = se2.compose(START_B, [2.0, 0.5, 0.2])  # b's second submap in the room

@@ -20,7 +20,7 @@ from mapweave.orders import OrderEffect, OrderKind
 from mapweave_protocol.link.asking import ask_orders
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import ORDER
-from tests.fusion_server.by_hand.conftest import Operator, walk
+from tests.fusion_server.by_hand.conftest import walk
 from tests.fusion_server.conftest import (
     MAPWEAVE,
     MakeAlignments,
@@ -28,6 +28,7 @@ from tests.fusion_server.conftest import (
     ServerProcess,
     StartServer,
 )
+from tests.people import Operator
 
 START_A, START_B = (1.0, 1.0, 0.3), (3.0, 2.0, -2.0)
 A_TO_B = se2.between(START_A, START_B)
