@@ -110,9 +110,8 @@ def _is_found_again(tracked: ScanMatch, parameters: AcceptanceParameters) -> boo
     and hardly anything speaks against it.
     """
     p, evidence = parameters, tracked.evidence
-    held = ellipse(tracked.information).least
     undisputed = evidence.disputed <= p.undisputed and tracked.surprise <= p.expected
-    return bool(held >= p.held and (evidence.score >= p.acceptable or undisputed))
+    return _is_held(tracked, p) and (evidence.score >= p.acceptable or undisputed)
 
 
 def is_acceptable(
@@ -127,8 +126,16 @@ def is_acceptable(
         return False
     if evidence.disputed <= p.expected_dispute and best.surprise <= p.expected:
         return True
-    doubt = evidence.disputed + p.leap * best.leap
+    doubts = evidence.disputed, p.leap * best.leap
+    # What explains half of what is seen, and is held, need not be free of both.
+    proven = evidence.score >= p.acceptable and _is_held(best, p)
+    doubt = max(doubts) if proven else sum(doubts)
     return doubt <= p.max_doubt and evidence.score - _best_rival(best, found, p) >= p.margin
+
+
+def _is_held(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
+    """Whether what was seen holds a pose in every direction."""
+    return ellipse(tracked.information).least >= p.held
 
 
 def _best_rival(best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters) -> float:

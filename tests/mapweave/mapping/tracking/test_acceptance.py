@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.tracking.acceptance import AcceptanceParameters, ScanMatch, tell_apart
+from mapweave.mapping.tracking.acceptance import (
+    AcceptanceParameters,
+    ScanMatch,
+    is_acceptable,
+    tell_apart,
+)
 from mapweave.mapping.tracking.local_map import ScanEvidence
 
 P = AcceptanceParameters()
@@ -45,3 +50,18 @@ def test_nothing_counts_where_a_different_pose_is_worth_more(turn: float) -> Non
 def test_a_pose_next_to_the_best_is_not_different() -> None:
     best, near = pose(0.5, 0.7), pose(0.7, 0.75, information=OPEN)
     assert tell_apart([best, near], P.novelty, P) == [best]
+
+
+def disputed_leap(leap: float, information: FloatArray) -> ScanMatch:
+    """Return a pose that a fifth of what is seen disputes, a leap away."""
+    evidence = ScanEvidence(0.72, 0.16, 0.0)
+    return ScanMatch(np.zeros(3), evidence, information, surprise=leap, leap=leap)
+
+
+def test_what_explains_half_and_is_held_may_be_disputed_and_take_a_leap() -> None:
+    there = disputed_leap(0.09, HELD)
+    assert is_acceptable(there, [there], P)
+    assert not is_acceptable(there, [there, pose(1.5, 0.6)], P)  # a look-alike
+    slid, far = disputed_leap(0.09, OPEN), disputed_leap(0.12, HELD)
+    assert not is_acceptable(slid, [slid], P)
+    assert not is_acceptable(far, [far], P)
