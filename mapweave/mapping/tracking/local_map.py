@@ -155,10 +155,17 @@ class LocalMap:
         self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
 
-    def search(self, points: FloatArray, centre: FloatArray, max_turn: float) -> FloatArray:
-        """Return the (k, 3) best poses for (n, 2) `points` in a window about `centre` (3,)."""
-        raster = self._nearness(centre)
-        return search(points, raster, centre, max_turn, self._parameters.search)
+    def search(
+        self, points: FloatArray, centre: FloatArray, max_turn: float, reach: float | None = None
+    ) -> FloatArray:
+        """Return the (k, 3) best poses for (n, 2) `points` in a window about `centre` (3,).
+
+        Its half width is `reach` [m], or the usual one.
+        """
+        p = self._parameters.search
+        if reach is not None:
+            p = p.model_copy(update={"reach": reach})
+        return search(points, self._nearness(centre), centre, max_turn, p)
 
     def _nearness(self, centre: FloatArray) -> LikelihoodField:
         """Return a raster about `centre`, made anew only where it has moved away."""

@@ -28,9 +28,9 @@ from mapweave.mapping.tracking.acceptance import (
 from mapweave.mapping.tracking.local_map import LocalMap, LocalMapParameters, ScanEvidence
 from mapweave.mapping.tracking.motion_model import MotionModel, MotionModelParameters
 from mapweave.mapping.tracking.observation import Observation
+from mapweave.mapping.tracking.reach import Reach, reach
 from mapweave.mapping.tracking.reachability import Reachability, ReachabilityParameters
 from mapweave.maps import LineMap
-from mapweave.matching.correlative import CorrelativeParameters
 from mapweave.matching.icp import Target, align, align_all
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import points_on_lines
@@ -69,10 +69,8 @@ class TrackerParameters(StageParameters):
     open_direction: float = Field(
         0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
     )
-    open_reach: float = derived(
-        lambda c: CorrelativeParameters.of(c).reach,
-        gt=0,
-        description="[m] searched along it, each way, as in the window of motions",
+    widest: float = Field(
+        4.0, gt=0, description="[m] searched each way, at the most: a keyframe log's longest steps"
     )
     open_step: float = Field(0.2, gt=0, description="[m] between places tried")
     first_window: float = derived(
@@ -175,10 +173,12 @@ class Tracker:
         """Whether a scan shows too little to be placed anywhere."""
         return len(seen.oriented) < self.parameters.min_points
 
-    def revisit(self, seen: Observation, near: FloatArray) -> ScanMatch | None:
-        """Find the pose of an older scan about `near` (3,), leaving the track as it is."""
+    def revisit(self, seen: Observation, near: FloatArray, reach: float) -> ScanMatch | None:
+        """Find the pose of an older scan within `reach` [m] of `near` (3,), leaving the track."""
         p = self.parameters.acceptance
-        starts = self._local.search(seen.oriented.points, near, np.pi)
+        usual, widest = self.parameters.local_map.search.reach, self.parameters.widest
+        reach = min(max(reach, usual), widest)
+        starts = self._local.search(seen.oriented.points, near, np.pi, reach)
         found = self._aligned(seen, np.vstack([near, starts]))
         best = max(found, key=lambda t: t.evidence.score + p.novelty * t.evidence.novel)
         return best if best.evidence.score >= p.acceptable else None
@@ -206,7 +206,7 @@ class Tracker:
         """Try the scans that were missed before the `last` one, from there backwards."""
         found, pose = [], self.pose
         for seen in reversed([seen for seen in self.missed if not self.is_blind(seen)]):
-            tracked = self.revisit(seen, pose)
+            tracked = self.revisit(seen, pose, self._reachability.between(seen.scan, last))
             if tracked is None:
                 continue
             if self._reachability.joins(seen.scan, tracked.pose, last, pose):
@@ -219,13 +219,13 @@ class Tracker:
         """Try what is likely first, then what shapes propose, then everything within reach."""
         p, a = self.parameters, self.parameters.acceptance
         predicted = self._predictions(seen.scan)
-        points = seen.oriented.points
+        points, wide = seen.oriented.points, self._window(seen.scan)
         stages: list[tuple[float, Callable[[], FloatArray]]] = [
             (a.convincing, lambda: predicted),
             (a.convincing, lambda: self.pose[None]),
             (a.convincing, lambda: self._shape_starts(seen, known())),
-            (a.convincing, lambda: self._local.search(points, predicted[0], p.first_window)),
-            (a.acceptable, lambda: self._local.search(points, predicted[0], np.pi)),
+            (a.convincing, lambda: self._local.search(points, predicted[0], p.first_window, wide)),
+            (a.acceptable, lambda: self._local.search(points, predicted[0], np.pi, wide)),
         ]
         found: list[ScanMatch] = []
         for enough, starts in stages:
@@ -265,17 +265,23 @@ class Tracker:
 
     def _reached(self, seen: Observation, starts: FloatArray) -> list[ScanMatch]:
         """Align from each of `starts` (k, 3); leave out where a robot cannot have got to."""
-        p, missed = self.parameters, len(self.missed)
-        reach = p.max_step * (1 + missed / 2)  # missed scans took time
-        untimed = self._reachability.interval is None and self._motion.is_paced
-        if missed or untimed:
-            reach = min(reach, self._motion.reach(1 + missed))
+        far = self._reach(seen.scan).far
         found = [
-            t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= reach
+            t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= far
         ]
         poses = np.array([t.pose for t in found]).reshape(-1, 3)
         possible = self._reachability.allows(seen.scan, poses)
         return [t for t, allowed in zip(found, possible, strict=True) if allowed]
+
+    def _reach(self, scan: Scan) -> Reach:
+        """How far it can have come since the last scan that was placed."""
+        missed, step = len(self.missed), self.parameters.max_step
+        return reach(scan, missed, step, self._motion, self._reachability)
+
+    def _window(self, scan: Scan) -> float:
+        """[m] to search, each way."""
+        p = self.parameters
+        return self._reach(scan).window(p.local_map.search.reach, p.widest)
 
     def _slides(self, seen: Observation, tracked: ScanMatch) -> list[ScanMatch]:
         """Look along the direction that the walls leave open, if they leave one: a corridor.
@@ -290,7 +296,8 @@ class Tracker:
         along, across = np.linalg.eigh(tracked.information[:2, :2])[1].T
         way = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))[:2]
         usual = se2.rotation(self.pose[2]) @ way @ along
-        steps = np.append(np.arange(-p.open_reach, p.open_reach + 1e-9, p.open_step), usual)
+        count = round(self._window(seen.scan) / p.open_step)
+        steps = np.append(np.arange(-count, count + 1) * p.open_step, usual)
         starts = np.tile(self.pose, (len(steps), 1))
         starts[:, 2] = tracked.pose[2]
         starts[:, :2] += across * (across @ (tracked.pose - self.pose)[:2])
