@@ -39,6 +39,15 @@ class AcceptanceParameters(BaseModel):
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+    remarkable: float = Field(
+        0.05, ge=0, description="surprise beyond which a pose is compared with everything else"
+    )
+    lead: float = Field(
+        0.05, ge=0, description="share of the returns by which it must be worth more than another"
+    )
+    open_direction: float = Field(
+        0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
+    )
     held: float = Field(
         2.5, gt=0, description="points that hold a pose in every direction, after a miss"
     )
@@ -131,6 +140,39 @@ def is_acceptable(
     proven = evidence.score >= p.acceptable and _is_held(best, p)
     doubt = max(doubts) if proven else sum(doubts)
     return doubt <= p.max_doubt and evidence.score - _best_rival(best, found, p) >= p.margin
+
+
+def is_ambiguous(
+    best: ScanMatch, found: Sequence[ScanMatch], turn: float, parameters: AcceptanceParameters
+) -> bool:
+    """Whether a remarkable pose, with a `turn` [rad], is not clearly worth most of all `found`.
+
+    Those along a direction that its walls leave open are not different: how far along is not known,
+    and its uncertainty says so. But along bare walls half a turn changes nothing: more than a
+    quarter is as well less than one the other way.
+    """
+    p = parameters
+    if best.surprise <= p.remarkable:
+        return False
+    if abs(turn) > np.pi / 2 and not _is_held(best, p):
+        return True
+    least = best.value(p.novelty) - p.lead
+    return any(t.value(p.novelty) > least and is_rival(best, t, p) for t in found)
+
+
+def is_rival(best: ScanMatch, other: ScanMatch, parameters: AcceptanceParameters) -> bool:
+    """Whether `other` is another pose, not just elsewhere along a direction that is open."""
+    return bool(_rivals(best, [other], parameters)) and not _is_slid(best, other, parameters)
+
+
+def _is_slid(best: ScanMatch, other: ScanMatch, p: AcceptanceParameters) -> bool:
+    """Whether `other` is `best`, but for how far along an open direction it is, or half a turn."""
+    held = ellipse(best.information)
+    half_turns = 2 * float(se2.wrap(other.pose[2] - best.pose[2]))
+    if held.least > p.open_direction * held.most or abs(se2.wrap(half_turns)) > 2 * p.rival_turn:
+        return False
+    across = np.linalg.eigh(best.information[:2, :2])[1][:, 1]
+    return bool(abs(across @ (other.pose - best.pose)[:2]) <= p.rival_distance)
 
 
 def _is_held(tracked: ScanMatch, p: AcceptanceParameters) -> bool:

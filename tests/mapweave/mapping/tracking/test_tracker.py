@@ -135,7 +135,7 @@ def test_what_shapes_propose_is_aligned_to_corresponding_polylines_alone(
     seen = Observation(scan, found, oriented, oriented, 0.5)
     np.testing.assert_array_equal(seen.lines.segments, lines.segments)
     near = Correspondence(np.array([0.0, 0.2, 0.0]), np.eye(2, dtype=np.bool_))
-    monkeypatch.setattr("mapweave.mapping.tracking.tracker.correspond", lambda *_: [near])
+    monkeypatch.setattr("mapweave.mapping.tracking.shape_starts.correspond", lambda *_: [near])
     [start] = Tracker()._shape_starts(seen, known)
     np.testing.assert_allclose(start, 0.0, atol=0.01)
 
