@@ -78,6 +78,7 @@ MEASURED: dict[str, dict[str, object]] = {
         "masks": (),
         "max_gap": 0.5,
         "spacing": 0.2,
+        "loose_gap": 0.25,
         "sight": 25.0,
     },
     "OwnBodyParameters": {"still": 0.06, "moved": 0.1, "edge": 0.25, "depth": 0.1},

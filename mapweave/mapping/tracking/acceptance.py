@@ -115,12 +115,13 @@ def tell_apart(
 def _is_found_again(tracked: ScanMatch, parameters: AcceptanceParameters) -> bool:
     """Whether a pose counts after a miss: held in every direction, and better than look-alikes.
 
-    The robot may be anywhere. So it must explain half of what is seen; or the robot should be there
-    and hardly anything speaks against it.
+    The robot may be anywhere. So it must explain half of what cannot have come since; or the robot
+    should be there and hardly anything speaks against it.
     """
     p, evidence = parameters, tracked.evidence
     undisputed = evidence.disputed <= p.undisputed and tracked.surprise <= p.expected
-    return _is_held(tracked, p) and (evidence.score >= p.acceptable or undisputed)
+    explains = evidence.without_excused.score >= p.acceptable
+    return _is_held(tracked, p) and (explains or undisputed)
 
 
 def is_acceptable(
@@ -131,15 +132,27 @@ def is_acceptable(
     As at the edge of the known: where the robot should be and undisputed, or without a rival.
     """
     p, evidence = parameters, best.evidence
+    if _is_proven(best, found, p):
+        return True
     if evidence.score < p.plausible:
         return False
     if evidence.disputed <= p.expected_dispute and best.surprise <= p.expected:
         return True
-    doubts = evidence.disputed, p.leap * best.leap
-    # What explains half of what is seen, and is held, need not be free of both.
-    proven = evidence.score >= p.acceptable and _is_held(best, p)
-    doubt = max(doubts) if proven else sum(doubts)
+    doubt = evidence.disputed + p.leap * best.leap
     return doubt <= p.max_doubt and evidence.score - _best_rival(best, found, p) >= p.margin
+
+
+def _is_proven(best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters) -> bool:
+    """Whether a pose is held, and explains half of what cannot have come since, as no other does.
+
+    Then it need be free neither of dispute nor of a leap, but of much of either.
+    """
+    evidence = best.evidence.without_excused
+    rivals = [t.evidence.without_excused.score for t in _rivals(best, found, p)]
+    doubt = max(evidence.disputed, p.leap * best.leap)
+    stands_out = evidence.score - max(rivals, default=-1.0) >= p.margin
+    explains = evidence.score >= p.acceptable
+    return _is_held(best, p) and explains and doubt <= p.max_doubt and stands_out
 
 
 def is_ambiguous(

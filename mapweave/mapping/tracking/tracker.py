@@ -336,7 +336,7 @@ class Tracker:
             thinned, self._local.target, starts, p.local_map.icp, self._prior, share=p.promising
         )
         poses = np.array([fit.pose for fit in fits])
-        judged = self._local.evidence(seen.scan, oriented, poses)
+        judged = self._local.evidence(seen.scan, oriented, seen.loose[: len(oriented)], poses)
         since = len(self.missed), self._told(seen.scan)
         steps = se2.between(self.pose, poses)
         return [

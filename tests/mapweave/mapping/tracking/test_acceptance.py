@@ -96,3 +96,13 @@ def test_in_a_bare_corridor_nobody_is_believed_to_have_turned_round() -> None:
     assert is_ambiguous(back, [back], 2.0, P)
     held = leapt(0.0, 0.9, turn=2.0, information=HELD)
     assert not is_ambiguous(held, [held], 2.0, P)
+
+
+def test_what_may_have_come_since_does_not_hide_where_the_robot_is() -> None:
+    """Half of what is seen are people: of the rest nearly all is explained."""
+    people, boxes = ScanEvidence(0.48, 0.5, 0.0, 0.48), ScanEvidence(0.48, 0.5, 0.0)
+    among, blocked = (ScanMatch(np.zeros(3), each, HELD) for each in (people, boxes))
+    assert is_acceptable(among, [among], P) and tell_apart([among], P.novelty, P) == [among]
+    assert not is_acceptable(blocked, [blocked], P) and tell_apart([blocked], P.novelty, P) == []
+    elsewhere = ScanMatch(np.array([2.0, 0.0, 0.0]), people, HELD)
+    assert not is_acceptable(among, [among, elsewhere], P)

@@ -132,7 +132,8 @@ def test_what_shapes_propose_is_aligned_to_corresponding_polylines_alone(
     oriented = OrientedPoints(on_polylines.points, on_polylines.normals, segment)
     scan = cast(WALLS, [9, 1, 0])
     found = ScanSegments(lines.segments, np.full(len(scan.ranges), -1))
-    seen = Observation(scan, found, oriented, oriented, 0.5)
+    fixed = np.zeros(len(oriented), dtype=np.bool_)
+    seen = Observation(scan, found, oriented, oriented, fixed, 0.5)
     np.testing.assert_array_equal(seen.lines.segments, lines.segments)
     near = Correspondence(np.array([0.0, 0.2, 0.0]), np.eye(2, dtype=np.bool_))
     monkeypatch.setattr("mapweave.mapping.tracking.shape_starts.correspond", lambda *_: [near])
@@ -184,6 +185,18 @@ def test_evidence_counts_for_and_against() -> None:
     assert blocked is not None
     assert blocked.evidence.contradicted > 0.05
     assert blocked.evidence.score < again.evidence.score - 0.05
+
+
+@pytest.mark.parametrize("half", [0.1, 0.3, 0.45])
+def test_what_stands_free_and_is_short_may_have_come_since(half: float) -> None:
+    person = np.array([[11.0, 1 + half, 11, 1 - half]])
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, [9, 1.0, 0]), cast(WALLS, [9.4, 1.0, 0])])
+    found = placed(tracker, cast(np.vstack([WALLS, person]), [9.2, 1, 0]))
+    assert found is not None
+    assert found.evidence.excused == found.evidence.contradicted > 0
+    assert found.evidence.without_excused.contradicted == 0
+    assert found.evidence.without_excused.score > max(0.9, found.evidence.score)
 
 
 def test_a_wall_that_the_scan_sees_through_speaks_against_its_pose() -> None:
