@@ -12,7 +12,7 @@ SOURCES := pyproject.toml README.md LICENSE \
 TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
 
 .PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
-.PHONY: bench-speed bench-faults bench-live bench-shape
+.PHONY: bench-speed bench-faults bench-live bench-robots bench-shape bench-robots
 .PHONY: clean distclean mutations
 
 $(STAMP): pyproject.toml
@@ -100,6 +100,9 @@ bench-live: $(KERNELS)
 
 bench-speed: $(KERNELS)
 	$(BIN)/python -m benchmarks speed
+
+bench-robots: $(KERNELS)
+	$(BIN)/python -m benchmarks robots
 
 bench-shape: $(KERNELS)
 	$(BIN)/python -m benchmarks shape --stretches 3 6

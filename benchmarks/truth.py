@@ -47,11 +47,13 @@ def paths(robot_map: RobotMap) -> list[Path2D]:
     return sorted(found, key=lambda path: -len(path.index))
 
 
-def steps_right(found: list[Path2D], truth: FloatArray) -> BoolArray:
+def steps_right(
+    found: list[Path2D], truth: FloatArray, counts: BoolArray | None = None
+) -> BoolArray:
     """Tell for each step whether it is right within 0.25 m and 5°.
 
     A step leads from a scan to the next one in the log whose (n, 3) `truth` is known; it counts
-    when both are placed in one component.
+    when both are placed in one component, and its first scan is one of those in `counts` (n,).
     """
     component = np.full(len(truth), -1)
     pose = np.full((len(truth), 3), np.nan)
@@ -60,6 +62,8 @@ def steps_right(found: list[Path2D], truth: FloatArray) -> BoolArray:
     known = np.flatnonzero(np.isfinite(truth[:, 0]))
     first, second = known[:-1], known[1:]
     together = (component[first] >= 0) & (component[first] == component[second])
+    if counts is not None:
+        together &= counts[first]
     first, second = first[together], second[together]
     distance, turn = _apart(
         se2.between(truth[first], truth[second]), se2.between(pose[first], pose[second])

@@ -29,15 +29,17 @@ inline std::vector<char> in_sight(const In<double, 2>& points, const In<double, 
   return found;
 }
 
-// (k, 2) how many of the points are explained at each pose, and how many contradicted.
+// (k, 3) how many of the points are explained at each pose, how many contradicted, and how many that
+// would be are on loose things.
 inline Out<int64_t> pose_evidence(const point_map::PointMap& known, const viewpoints::Viewpoints& viewpoints,
-                                  In<double, 2> points, In<double, 2> normals, In<double, 2> poses,
-                                  const Settings& p) {
+                                  In<double, 2> points, In<double, 2> normals, In<bool, 1> loose,
+                                  In<double, 2> poses, const Settings& p) {
   const size_t n = points.shape(0), k = poses.shape(0);
-  if (points.shape(1) != 2 || normals.shape(1) != 2 || normals.shape(0) != n || poses.shape(1) != 3)
-    throw std::invalid_argument("points and normals: (n, 2) each, poses: (k, 3) expected");
+  if (points.shape(1) != 2 || normals.shape(1) != 2 || normals.shape(0) != n || loose.shape(0) != n ||
+      poses.shape(1) != 3)
+    throw std::invalid_argument("points and normals: (n, 2) each, loose: (n,), poses: (k, 3) expected");
   const std::vector<char> judged = in_sight(points, normals, p.sight);
-  std::vector<int64_t> counts(2 * k, 0);
+  std::vector<int64_t> counts(3 * k, 0);
   for (size_t j = 0; j < k; ++j) {
     const double* pose = poses.data() + 3 * j;
     const double c = std::cos(pose[2]), s = std::sin(pose[2]);
@@ -45,16 +47,16 @@ inline Out<int64_t> pose_evidence(const point_map::PointMap& known, const viewpo
     for (size_t i = 0; i < n; ++i) {
       const double* at = points.data() + 2 * i;
       if (known.explains_one(at, normals.data() + 2 * i, pose, c, s, p.overlap)) {
-        ++counts[2 * j];
+        ++counts[3 * j];
       } else if (judged[i]) {
         const double x = pose[0] + c * at[0] - s * at[1], y = pose[1] + s * at[0] + c * at[1];
-        counts[2 * j + 1] += std::any_of(witnesses.begin(), witnesses.end(), [&](const viewpoints::Viewpoint* witness) {
+        counts[3 * j + (loose.data()[i] ? 2 : 1)] += std::any_of(witnesses.begin(), witnesses.end(), [&](const viewpoints::Viewpoint* witness) {
           return witness->saw_through(x, y, p.clearance);
         });
       }
     }
   }
-  return give(std::move(counts), {k, 2});
+  return give(std::move(counts), {k, 3});
 }
 
 }  // namespace pose_evidence
@@ -71,5 +73,5 @@ inline void bind_pose_evidence(nb::module_& m) {
            nb::arg("facing"))
       .def("__deepcopy__", [](const Settings& self, nb::handle) { return self; }, nb::arg("memo"));
   m.def("pose_evidence", &pose_evidence::pose_evidence, nb::arg("known"), nb::arg("viewpoints"), nb::arg("points"),
-        nb::arg("normals"), nb::arg("poses"), nb::arg("settings"));
+        nb::arg("normals"), nb::arg("loose"), nb::arg("poses"), nb::arg("settings"));
 }

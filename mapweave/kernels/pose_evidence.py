@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from mapweave.kernels.loading import COMPILED
-from mapweave.kernels.point_map import Floats, Ints, PointMap
+from mapweave.kernels.point_map import Bools, Floats, Ints, PointMap
 from mapweave.kernels.viewpoints import Viewpoints
 
 
@@ -38,6 +38,7 @@ def pose_evidence_numpy(
     viewpoints: Viewpoints,
     points: Floats,
     normals: Floats,
+    loose: Bools,
     poses: Floats,
     settings: EvidenceSettings,
 ) -> Ints:
@@ -49,7 +50,8 @@ def pose_evidence_numpy(
     faced = ahead / np.maximum(distance, 1e-9) > p.facing
     judged = (distance < p.sight) | (faced & (distance < p.far_sight))
     free = viewpoints.free(points, poses, ~explained & judged, p.witnesses, p.clearance)
-    return np.column_stack([explained.sum(axis=1), free.sum(axis=1)])
+    against, excused = (free & ~loose).sum(axis=1), (free & loose).sum(axis=1)
+    return np.column_stack([explained.sum(axis=1), against, excused])
 
 
 def pose_evidence(
@@ -57,12 +59,14 @@ def pose_evidence(
     viewpoints: Viewpoints,
     points: Floats,
     normals: Floats,
+    loose: Bools,
     poses: Floats,
     settings: EvidenceSettings,
 ) -> Ints:
-    """Return (k, 2) how many points speak for each of `poses` (k, 3), and how many against it.
+    """Return (k, 3) how many points speak for each of `poses` (k, 3), and how many against it.
 
-    For it those on known surfaces, against it those where earlier scans saw free space.
+    For it those on known surfaces, against it those where earlier scans saw free space; the last
+    column counts those against it that are on loose things, and are left out of the others.
 
     Parameters
     ----------
@@ -72,13 +76,15 @@ def pose_evidence(
         From where, and what was seen through from there.
     points, normals
         (n, 2) of a scan [m], and unit vectors, sensor frame.
+    loose
+        (n,) which of them are on things that may have come since.
     poses
         [m, m, rad], frame of `known`.
     settings
         As of `evidence_settings`.
     """
     compute = pose_evidence_numpy if COMPILED is None else COMPILED.pose_evidence
-    return cast("Ints", compute(known, viewpoints, points, normals, poses, settings))
+    return cast("Ints", compute(known, viewpoints, points, normals, loose, poses, settings))
 
 
 def evidence_settings(settings: EvidenceSettings) -> EvidenceSettings:

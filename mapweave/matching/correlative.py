@@ -88,7 +88,8 @@ def search(
     if len(points) > p.max_points:
         points = points[np.linspace(0, len(points) - 1, p.max_points).astype(np.int64)]
     turns = centre[2] + np.arange(-max_turn, max_turn + 1e-9, p.turn_step)
-    shifts = np.arange(-p.reach, p.reach + 1e-9, p.step)
+    count = round(p.reach / p.step)
+    shifts = np.arange(-count, count + 1) * p.step
     scores = window_scores(
         np.ascontiguousarray(points),
         raster.value,

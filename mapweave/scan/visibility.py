@@ -57,6 +57,11 @@ def beam_spacing(scan: Scan) -> float:
     return float((scan.angles[-1] - scan.angles[0]) / max(len(scan.angles) - 1, 1))
 
 
+def beams_at(scan: Scan, points: FloatArray) -> IntArray:
+    """Return (n,) which beam of `scan` points nearest to each of `points` (n, 2), sensor frame."""
+    return _beams(scan, np.arctan2(points[:, 1], points[:, 0]))[0]
+
+
 def _beams(scan: Scan, bearing: FloatArray) -> tuple[IntArray, BoolArray]:
     """Return (n,) which beam points nearest to each `bearing` [rad], and whether one does.
 

@@ -78,6 +78,7 @@ MEASURED: dict[str, dict[str, object]] = {
         "masks": (),
         "max_gap": 0.5,
         "spacing": 0.2,
+        "loose_gap": 0.25,
         "sight": 25.0,
     },
     "OwnBodyParameters": {"still": 0.06, "moved": 0.1, "edge": 0.25, "depth": 0.1},
@@ -108,7 +109,6 @@ MEASURED: dict[str, dict[str, object]] = {
     "TrackerParameters": {
         "line_spacing": 0.1,
         "max_step": 2.5,
-        "open_reach": 1.2,
         "first_window": 1.15,
     },
     "VerificationParameters": {"closeness": 0.25, "clearance": 0.3},
@@ -194,7 +194,7 @@ def test_a_faster_sensor_or_a_slower_robot_narrows_what_is_searched() -> None:
     slower = TrackerParameters.of(Config(robot=Robot(max_speed=0.2, max_turn_rate=math.pi / 10)))
     for one in (faster, slower):
         assert one.max_step == pytest.approx(0.7)
-        assert one.open_reach == one.local_map.search.reach == pytest.approx(0.3)
+        assert one.local_map.search.reach == pytest.approx(0.3)
         assert one.first_window == pytest.approx(default.first_window / 10)
 
 

@@ -39,6 +39,15 @@ class AcceptanceParameters(BaseModel):
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+    remarkable: float = Field(
+        0.05, ge=0, description="surprise beyond which a pose is compared with everything else"
+    )
+    lead: float = Field(
+        0.05, ge=0, description="share of the returns by which it must be worth more than another"
+    )
+    open_direction: float = Field(
+        0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
+    )
     held: float = Field(
         2.5, gt=0, description="points that hold a pose in every direction, after a miss"
     )
@@ -106,13 +115,13 @@ def tell_apart(
 def _is_found_again(tracked: ScanMatch, parameters: AcceptanceParameters) -> bool:
     """Whether a pose counts after a miss: held in every direction, and better than look-alikes.
 
-    The robot may be anywhere. So it must explain half of what is seen; or the robot should be there
-    and hardly anything speaks against it.
+    The robot may be anywhere. So it must explain half of what cannot have come since; or the robot
+    should be there and hardly anything speaks against it.
     """
     p, evidence = parameters, tracked.evidence
-    held = ellipse(tracked.information).least
     undisputed = evidence.disputed <= p.undisputed and tracked.surprise <= p.expected
-    return bool(held >= p.held and (evidence.score >= p.acceptable or undisputed))
+    explains = evidence.without_excused.score >= p.acceptable
+    return _is_held(tracked, p) and (explains or undisputed)
 
 
 def is_acceptable(
@@ -123,12 +132,65 @@ def is_acceptable(
     As at the edge of the known: where the robot should be and undisputed, or without a rival.
     """
     p, evidence = parameters, best.evidence
+    if _is_proven(best, found, p):
+        return True
     if evidence.score < p.plausible:
         return False
     if evidence.disputed <= p.expected_dispute and best.surprise <= p.expected:
         return True
     doubt = evidence.disputed + p.leap * best.leap
     return doubt <= p.max_doubt and evidence.score - _best_rival(best, found, p) >= p.margin
+
+
+def _is_proven(best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters) -> bool:
+    """Whether a pose is held, and explains half of what cannot have come since, as no other does.
+
+    Then it need be free neither of dispute nor of a leap, but of much of either.
+    """
+    evidence = best.evidence.without_excused
+    rivals = [t.evidence.without_excused.score for t in _rivals(best, found, p)]
+    doubt = max(evidence.disputed, p.leap * best.leap)
+    stands_out = evidence.score - max(rivals, default=-1.0) >= p.margin
+    explains = evidence.score >= p.acceptable
+    return _is_held(best, p) and explains and doubt <= p.max_doubt and stands_out
+
+
+def is_ambiguous(
+    best: ScanMatch, found: Sequence[ScanMatch], turn: float, parameters: AcceptanceParameters
+) -> bool:
+    """Whether a remarkable pose, with a `turn` [rad], is not clearly worth most of all `found`.
+
+    Those along a direction that its walls leave open are not different: how far along is not known,
+    and its uncertainty says so. But along bare walls half a turn changes nothing: more than a
+    quarter is as well less than one the other way.
+    """
+    p = parameters
+    if best.surprise <= p.remarkable:
+        return False
+    if abs(turn) > np.pi / 2 and not _is_held(best, p):
+        return True
+    least = best.value(p.novelty) - p.lead
+    return any(t.value(p.novelty) > least and is_rival(best, t, p) for t in found)
+
+
+def is_rival(best: ScanMatch, other: ScanMatch, parameters: AcceptanceParameters) -> bool:
+    """Whether `other` is another pose, not just elsewhere along a direction that is open."""
+    return bool(_rivals(best, [other], parameters)) and not _is_slid(best, other, parameters)
+
+
+def _is_slid(best: ScanMatch, other: ScanMatch, p: AcceptanceParameters) -> bool:
+    """Whether `other` is `best`, but for how far along an open direction it is, or half a turn."""
+    held = ellipse(best.information)
+    half_turns = 2 * float(se2.wrap(other.pose[2] - best.pose[2]))
+    if held.least > p.open_direction * held.most or abs(se2.wrap(half_turns)) > 2 * p.rival_turn:
+        return False
+    across = np.linalg.eigh(best.information[:2, :2])[1][:, 1]
+    return bool(abs(across @ (other.pose - best.pose)[:2]) <= p.rival_distance)
+
+
+def _is_held(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
+    """Whether what was seen holds a pose in every direction."""
+    return ellipse(tracked.information).least >= p.held
 
 
 def _best_rival(best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters) -> float:

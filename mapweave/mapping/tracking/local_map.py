@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.kernels.point_map import make_point_map
 from mapweave.kernels.pose_evidence import (
     EvidenceSettings,
@@ -88,11 +88,14 @@ class ScanEvidence:
         Of the returns: where earlier scans saw free space.
     seen_through
         Of the known surface points in sight: where this scan saw free space.
+    excused
+        Of the returns: those contradicted that are on things that may have come since.
     """
 
     explained: float
     contradicted: float
     seen_through: float
+    excused: float = 0.0
 
     @property
     def novel(self) -> float:
@@ -109,6 +112,13 @@ class ScanEvidence:
         """What speaks against, as a share of all that speaks."""
         against = self.contradicted + self.seen_through
         return against / max(self.explained + against, 1e-9)
+
+    @property
+    def without_excused(self) -> "ScanEvidence":
+        """The same of the other returns: what may have come since neither is seen nor hides."""
+        others = 1.0 - self.excused
+        against = self.contradicted - self.excused
+        return ScanEvidence(self.explained / others, against / others, self.seen_through)
 
 
 class LocalMap:
@@ -155,10 +165,17 @@ class LocalMap:
         self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
 
-    def search(self, points: FloatArray, centre: FloatArray, max_turn: float) -> FloatArray:
-        """Return the (k, 3) best poses for (n, 2) `points` in a window about `centre` (3,)."""
-        raster = self._nearness(centre)
-        return search(points, raster, centre, max_turn, self._parameters.search)
+    def search(
+        self, points: FloatArray, centre: FloatArray, max_turn: float, reach: float | None = None
+    ) -> FloatArray:
+        """Return the (k, 3) best poses for (n, 2) `points` in a window about `centre` (3,).
+
+        Its half width is `reach` [m], or the usual one.
+        """
+        p = self._parameters.search
+        if reach is not None:
+            p = p.model_copy(update={"reach": reach})
+        return search(points, self._nearness(centre), centre, max_turn, p)
 
     def _nearness(self, centre: FloatArray) -> LikelihoodField:
         """Return a raster about `centre`, made anew only where it has moved away."""
@@ -168,7 +185,7 @@ class LocalMap:
         return self._raster
 
     def evidence(
-        self, scan: Scan, oriented: OrientedPoints, poses: FloatArray
+        self, scan: Scan, oriented: OrientedPoints, loose: BoolArray, poses: FloatArray
     ) -> list[ScanEvidence]:
         """Return what speaks for and against `scan` at each of `poses` (k, 3).
 
@@ -176,15 +193,18 @@ class LocalMap:
         ----------
         oriented
             The oriented points of `scan`, sensor frame.
+        loose
+            (n,) which of them are on things that may have come since: where nothing was before, no
+            proof against a pose; of half of the returns at the most.
         """
         p, count = self._parameters, max(len(oriented), 1)
-        asked = oriented.points, oriented.normals, poses
+        asked = oriented.points, oriented.normals, loose, poses
         counts = pose_evidence(self._known, self._viewpoints, *asked, self._settings)
         sight = p.clearance, p.sight, p.far_sight, p.facing
         through = self._known.seen_through(*self._view(scan), poses, *sight, p.sample)
         return [
-            ScanEvidence(explained / count, contradicted / count, share)
-            for (explained, contradicted), share in zip(
+            _evidence((explained, contradicted, excusable), share, count)
+            for (explained, contradicted, excusable), share in zip(
                 counts.tolist(), through.tolist(), strict=True
             )
         ]
@@ -205,6 +225,13 @@ class LocalMap:
         x, y, turn = se2.between(self._last, pose)
         p = self._parameters
         return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
+
+
+def _evidence(counts: tuple[int, int, int], through: float, count: int) -> ScanEvidence:
+    explained, contradicted, loose = counts
+    excused = min(loose, count // 2)
+    against = contradicted + loose
+    return ScanEvidence(explained / count, against / count, through, excused / count)
 
 
 def _settings(p: LocalMapParameters) -> EvidenceSettings:

@@ -41,7 +41,12 @@ class MotionModelParameters(BaseModel):
     max_sigma: float = Field(
         0.5, gt=0, description="[m] as long as nothing is known, after a miss, and by odometry"
     )
-    turn_sigma: float = Field(0.35, gt=0, description="[rad] of a turn against the last one")
+    turn_sigma: float = Field(
+        0.35, gt=0, description="[rad] of a turn against the last one, at the least"
+    )
+    uneven: float = Field(
+        0.5, gt=0, description="of its usual step, by which any robot's may differ at the least"
+    )
     surprise: float = Field(
         0.02, ge=0, description="share of returns that a step e sigma² off is worth less"
     )
@@ -68,6 +73,9 @@ class MotionModel:
         self._steps: deque[tuple[float, float, float]] = deque(maxlen=parameters.known)
         self._off: deque[float] = deque(maxlen=parameters.known)
         self._sigma = parameters.max_sigma  # [m] of a step with a turn that is known
+        self._turns: deque[float] = deque(maxlen=parameters.known)  # [rad] from one to the next
+        self._turn_sigma = parameters.turn_sigma
+        self._any_sigma = parameters.max_sigma  # [m] of a step of any robot with steps as long
         self._last = (0.0, 0.0, 0.0)
 
     def copy(self) -> "MotionModel":
@@ -75,6 +83,8 @@ class MotionModel:
         other = MotionModel(self._p)
         other._steps, other._off = self._steps.copy(), self._off.copy()
         other._sigma, other._last = self._sigma, self._last
+        other._turns = self._turns.copy()
+        other._turn_sigma, other._any_sigma = self._turn_sigma, self._any_sigma
         return other
 
     def guesses(self, missed: int = 0, told: FloatArray | None = None) -> FloatArray:
@@ -100,7 +110,7 @@ class MotionModel:
         x, y, turn = step.tolist()
         expected = self._expected(turn, missed, told)
         surprise = min(self._off_by(x, y, turn, e, e.sigma) for e in expected)
-        leap = min(self._off_by(x, y, turn, e, self._p.max_sigma) for e in expected)
+        leap = min(self._off_by(x, y, turn, e, self._any_sigma) for e in expected)
         return surprise, leap
 
     def surprise(self, step: FloatArray, missed: int = 0, told: FloatArray | None = None) -> float:
@@ -124,7 +134,7 @@ class MotionModel:
         """Whether enough steps were determined to say how far it goes in one, at the most."""
         return len(self._steps) >= self._p.paced
 
-    def reach(self, steps: int) -> float:
+    def reach(self, steps: float) -> float:
         """Return how far [m] a robot comes in so many steps, were each as long as its longest."""
         p = self._p
         longest = max((math.hypot(x, y) for x, y, _ in self._steps), default=math.inf)
@@ -139,9 +149,23 @@ class MotionModel:
                 self._off.append(math.hypot(x - usual_x, y - usual_y))
                 if len(self._off) > self._p.steps:
                     sigma = self._p.spread * median(self._off)
-                    self._sigma = min(max(sigma, self._p.min_sigma), self._p.max_sigma)
+                    self._sigma = min(max(sigma, self._p.min_sigma), self._any_sigma)
             self._steps.append((x, y, turn))
+            self._turns.append(abs(math.remainder(turn - self._last[2], 2 * math.pi)))
+            self._measure()
         self._last = (x, y, turn)
+
+    def _measure(self) -> None:
+        """Measure how its turns differ, and what is much for steps as long as its own.
+
+        One that says where it is every 2 m has turned by any angle meanwhile.
+        """
+        p = self._p
+        if len(self._turns) <= p.steps:
+            return
+        self._turn_sigma = max(p.turn_sigma, p.spread * median(self._turns))
+        usual = median(math.hypot(x, y) for x, y, _ in self._steps)
+        self._any_sigma = max(p.max_sigma, p.uneven * usual)
 
     def _alike(self, turn: float) -> list[tuple[float, float]]:
         """Ways that went with turns alike, the latest; to the other side counts as well."""
@@ -168,7 +192,7 @@ class MotionModel:
             gone = np.array([*self.way(last)[:2], last])
             for _ in range(missed):
                 gone = se2.compose(gone, straight)
-            found = [_step(gone, p.max_sigma), _step(se2.IDENTITY, p.max_sigma)]
+            found = [_step(gone, self._any_sigma), _step(se2.IDENTITY, self._any_sigma)]
         else:
             x, y, sigma = self.way(turn)
             found = [_Expected(x, y, last, sigma)]
@@ -178,7 +202,7 @@ class MotionModel:
         """Heavy-tailed: robots do turn on the spot between two scans, only not often."""
         p = self._p
         dx, dy = x - expected.x, y - expected.y
-        turned = math.remainder(turn - expected.turn, 2 * math.pi) / p.turn_sigma
+        turned = math.remainder(turn - expected.turn, 2 * math.pi) / self._turn_sigma
         moved = math.log1p((dx * dx + dy * dy) / sigma**2)
         return p.surprise * moved + p.turn_surprise * math.log1p(turned * turned)
 

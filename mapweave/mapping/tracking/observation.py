@@ -5,15 +5,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from pydantic import Field
 
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.geometry.sectors import Sector, within
 from mapweave.lines.polylines import group_polylines
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
+from mapweave.scan.loose_things import loose_things
 from mapweave.scan.points import OrientedPoints, join_points, scan_points
 from mapweave.scan.scan import Scan
 from mapweave.scan.segmentation import ScanSegments, SegmentationParameters, extract_segments
+from mapweave.scan.visibility import beams_at
 
 
 class ObservationParameters(StageParameters):
@@ -42,6 +45,12 @@ class ObservationParameters(StageParameters):
         gt=0,
         description="[m] between points on walls, at the most",
     )
+    loose_width: float = Field(
+        1.0, ge=0, description="[m] what stands free and is no wider may move, or have been moved"
+    )
+    loose_gap: float = derived(
+        lambda c: c.mapping.closeness, gt=0, description="[m] that it is before all beside it"
+    )
     sight: float = derived(
         lambda c: c.mapping.far_range,
         gt=0,
@@ -64,6 +73,8 @@ class Observation:
         The oriented points of its returns; `polyline` names the segment of each.
     walls
         The same with points between them where they lie on one segment: what to remember.
+    loose
+        (m,) which of `walls` are on things that may move; first come those of `oriented`.
     max_gap
         [m] within a generalized polyline.
     """
@@ -72,6 +83,7 @@ class Observation:
     found: ScanSegments
     oriented: OrientedPoints
     walls: OrientedPoints
+    loose: BoolArray
     max_gap: float
 
     @property
@@ -105,7 +117,9 @@ def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     scan = _measured(scan, p)
     found = extract_segments(scan, p.segments)
     oriented, between = scan_points(scan, found, p.sight, p.spacing)
-    return Observation(scan, found, oriented, join_points([oriented, between]), p.max_gap)
+    walls = join_points([oriented, between])
+    loose = loose_things(scan, p.loose_width, p.loose_gap)[beams_at(scan, walls.points)] >= 0
+    return Observation(scan, found, oriented, walls, loose, p.max_gap)
 
 
 def _measured(scan: Scan, parameters: ObservationParameters) -> Scan:

@@ -90,6 +90,20 @@ class Reachability:
         while len(self._way) > 1 and self._time(self._way[1], scan) >= self._p.window:
             self._way.popleft()
 
+    def since_placed(self, scan: Scan) -> float:
+        """Return how long ago [s] a scan was placed; infinite where nothing tells."""
+        if self.interval is None or not self._way:
+            return math.inf
+        return self._time(self._way[-1], scan)
+
+    def between(self, scan: Scan, other: Scan) -> float:
+        """Return how far [m] a robot comes between two scans, as far as stamps tell."""
+        return self.way(self._time(_Stay(other.index, other.stamp, se2.IDENTITY), scan))
+
+    def way(self, time: float) -> float:
+        """Return how far [m] a robot comes in a `time` [s]."""
+        return self._p.slack + self._p.max_speed * time
+
     def allows(self, scan: Scan, poses: FloatArray) -> BoolArray:
         """(k,) whether the robot can have come to each of `poses` (k, 3) by the time of `scan`."""
         return self._within(self._way, scan, poses)

@@ -22,20 +22,21 @@ from mapweave.mapping.tracking.acceptance import (
     AcceptanceParameters,
     ScanMatch,
     is_acceptable,
+    is_ambiguous,
     is_credible,
     tell_apart,
 )
 from mapweave.mapping.tracking.local_map import LocalMap, LocalMapParameters, ScanEvidence
 from mapweave.mapping.tracking.motion_model import MotionModel, MotionModelParameters
 from mapweave.mapping.tracking.observation import Observation
+from mapweave.mapping.tracking.reach import Reach, reach
 from mapweave.mapping.tracking.reachability import Reachability, ReachabilityParameters
+from mapweave.mapping.tracking.shape_starts import shape_starts
 from mapweave.maps import LineMap
-from mapweave.matching.correlative import CorrelativeParameters
-from mapweave.matching.icp import Target, align, align_all
+from mapweave.matching.icp import align_all
 from mapweave.parameters import StageParameters, derived
-from mapweave.scan.points import points_on_lines
 from mapweave.scan.scan import Scan
-from mapweave.shape.correspondence import CorrespondenceParameters, correspond
+from mapweave.shape.correspondence import CorrespondenceParameters
 
 Found = list[tuple[Observation, ScanMatch]]
 EQUAL = 1e-3  # share of the returns by which worth must differ to matter
@@ -66,13 +67,8 @@ class TrackerParameters(StageParameters):
     open_novelty: float = Field(
         0.8, ge=0, le=1, description="what a return at a new place counts along bare walls"
     )
-    open_direction: float = Field(
-        0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
-    )
-    open_reach: float = derived(
-        lambda c: CorrelativeParameters.of(c).reach,
-        gt=0,
-        description="[m] searched along it, each way, as in the window of motions",
+    widest: float = Field(
+        4.0, gt=0, description="[m] searched each way, at the most: a keyframe log's longest steps"
     )
     open_step: float = Field(0.2, gt=0, description="[m] between places tried")
     first_window: float = derived(
@@ -165,8 +161,7 @@ class Tracker:
     def take_back(self) -> None:
         """Forget the scan on probation, if any: it is missed, as those after it are."""
         if self._before is not None:
-            doubtful, _ = self._probation[0]
-            since = [doubtful, *self.missed]
+            since = [self._probation[0][0], *self.missed]
             self.pose, missed, self._motion, self._odometry, self._local, at = self._before
             self.missed, self._reachability = [*missed, *since], at
         self._before, self._probation = None, []
@@ -175,10 +170,11 @@ class Tracker:
         """Whether a scan shows too little to be placed anywhere."""
         return len(seen.oriented) < self.parameters.min_points
 
-    def revisit(self, seen: Observation, near: FloatArray) -> ScanMatch | None:
-        """Find the pose of an older scan about `near` (3,), leaving the track as it is."""
+    def revisit(self, seen: Observation, near: FloatArray, reach: float) -> ScanMatch | None:
+        """Find the pose of an older scan within `reach` [m] of `near` (3,), leaving the track."""
         p = self.parameters.acceptance
-        starts = self._local.search(seen.oriented.points, near, np.pi)
+        wide = min(max(reach, self.parameters.local_map.search.reach), self.parameters.widest)
+        starts = self._local.search(seen.oriented.points, near, np.pi, wide)
         found = self._aligned(seen, np.vstack([near, starts]))
         best = max(found, key=lambda t: t.evidence.score + p.novelty * t.evidence.novel)
         return best if best.evidence.score >= p.acceptable else None
@@ -206,7 +202,7 @@ class Tracker:
         """Try the scans that were missed before the `last` one, from there backwards."""
         found, pose = [], self.pose
         for seen in reversed([seen for seen in self.missed if not self.is_blind(seen)]):
-            tracked = self.revisit(seen, pose)
+            tracked = self.revisit(seen, pose, self._reachability.between(seen.scan, last))
             if tracked is None:
                 continue
             if self._reachability.joins(seen.scan, tracked.pose, last, pose):
@@ -216,29 +212,49 @@ class Tracker:
         return found
 
     def _locate(self, seen: Observation, known: Callable[[], LineMap]) -> ScanMatch | None:
-        """Try what is likely first, then what shapes propose, then everything within reach."""
+        """Try what is likely first, then what shapes propose, then everything within reach.
+
+        What is remarkable is compared with everything, however well it fits.
+        """
         p, a = self.parameters, self.parameters.acceptance
-        predicted = self._predictions(seen.scan)
-        points = seen.oriented.points
-        stages: list[tuple[float, Callable[[], FloatArray]]] = [
-            (a.convincing, lambda: predicted),
-            (a.convincing, lambda: self.pose[None]),
-            (a.convincing, lambda: self._shape_starts(seen, known())),
-            (a.convincing, lambda: self._local.search(points, predicted[0], p.first_window)),
-            (a.acceptable, lambda: self._local.search(points, predicted[0], np.pi)),
+        predicted, points = self._predictions(seen.scan), seen.oriented.points
+        wide = self._window(seen.scan)
+        likely_first: list[Callable[[], FloatArray]] = [
+            lambda: predicted,
+            lambda: self.pose[None],
+            lambda: self._shape_starts(seen, known()),
+            lambda: self._local.search(points, predicted[0], p.first_window, wide),
         ]
         found: list[ScanMatch] = []
-        for enough, starts in stages:
+        for starts in likely_first:
             found += self._reached(seen, starts())
             best = self._best(found, a.novelty)
-            if best is not None and best.evidence.score >= enough and is_credible(best, a):
-                slides = self._slides(seen, best)
-                found += slides
-                best = self._best([best, *slides], p.open_novelty)
-                if best is not None:
+            if best is not None and best.evidence.score >= a.convincing and is_credible(best, a):
+                best = self._slid(seen, best, found)
+                if best.surprise <= a.remarkable:
                     return best
-        likely = self._likely(found, a.novelty)
-        return best if best is not None and is_acceptable(best, likely, a) else None
+                break
+        found += self._reached(seen, self._local.search(points, predicted[0], np.pi, wide))
+        return self._best_of_all(seen, found)
+
+    def _best_of_all(self, seen: Observation, found: list[ScanMatch]) -> ScanMatch | None:
+        """Return the best of all within reach, if it is believed and no look-alike."""
+        a = self.parameters.acceptance
+        best = self._best(found, a.novelty)
+        if best is None:
+            return None
+        if best.evidence.score >= a.acceptable and is_credible(best, a):
+            best = self._slid(seen, best, found)
+        elif not is_acceptable(best, self._likely(found, a.novelty), a):
+            return None
+        turn = float(se2.wrap(best.pose[2] - self.pose[2]))
+        return None if is_ambiguous(best, found, turn, a) else best
+
+    def _slid(self, seen: Observation, best: ScanMatch, found: list[ScanMatch]) -> ScanMatch:
+        """Return the best along the direction that is left open, if one is; add it to `found`."""
+        slides = self._slides(seen, best)
+        found += slides
+        return self._best([best, *slides], self.parameters.open_novelty) or best
 
     def _likely(self, found: list[ScanMatch], novelty: float) -> list[ScanMatch]:
         """Those that count: after a miss, where the best can be told from look-alikes."""
@@ -247,7 +263,7 @@ class Tracker:
     def _best(self, found: list[ScanMatch], novelty: float) -> ScanMatch | None:
         """The one worth most of those that count, the first of equals; None where none does.
 
-        Many starts end within a millimetre of each other: rounding must not choose among them.
+        Many starts end within a millimetre of each other: rounding must not choose.
         """
         likely = [(t.value(novelty), t) for t in self._likely(found, novelty)]
         most = max((value for value, _ in likely), default=0.0)
@@ -265,52 +281,48 @@ class Tracker:
 
     def _reached(self, seen: Observation, starts: FloatArray) -> list[ScanMatch]:
         """Align from each of `starts` (k, 3); leave out where a robot cannot have got to."""
-        p, missed = self.parameters, len(self.missed)
-        reach = p.max_step * (1 + missed / 2)  # missed scans took time
-        untimed = self._reachability.interval is None and self._motion.is_paced
-        if missed or untimed:
-            reach = min(reach, self._motion.reach(1 + missed))
+        far = self._reach(seen.scan).far
         found = [
-            t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= reach
+            t for t in self._aligned(seen, starts) if np.hypot(*(t.pose - self.pose)[:2]) <= far
         ]
         poses = np.array([t.pose for t in found]).reshape(-1, 3)
         possible = self._reachability.allows(seen.scan, poses)
         return [t for t, allowed in zip(found, possible, strict=True) if allowed]
 
+    def _reach(self, scan: Scan) -> Reach:
+        """How far it can have come since the last scan that was placed."""
+        step = self.parameters.max_step
+        return reach(scan, len(self.missed), step, self._motion, self._reachability)
+
+    def _window(self, scan: Scan) -> float:
+        """[m] to search, each way."""
+        p = self.parameters
+        return self._reach(scan).window(p.local_map.search.reach, p.widest)
+
     def _slides(self, seen: Observation, tracked: ScanMatch) -> list[ScanMatch]:
         """Look along the direction that the walls leave open, if they leave one: a corridor.
 
-        Every place a bounded speed allows is tried, and where the pace would lead; what both sides
-        saw decides.
+        Every place within reach is tried, and where the pace would lead; what both saw decides.
         """
         p = self.parameters
         held = ellipse(tracked.information)
-        if held.least > p.open_direction * held.most:
+        if held.least > p.acceptance.open_direction * held.most:
             return []
         along, across = np.linalg.eigh(tracked.information[:2, :2])[1].T
         way = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))[:2]
         usual = se2.rotation(self.pose[2]) @ way @ along
-        steps = np.append(np.arange(-p.open_reach, p.open_reach + 1e-9, p.open_step), usual)
-        starts = np.tile(self.pose, (len(steps), 1))
-        starts[:, 2] = tracked.pose[2]
-        starts[:, :2] += across * (across @ (tracked.pose - self.pose)[:2])
-        starts[:, :2] += steps[:, None] * along
+        count = round(self._window(seen.scan) / p.open_step)
+        steps = np.append(np.arange(-count, count + 1) * p.open_step, usual)
+        aside = across @ (tracked.pose - self.pose)[:2]
+        at = self.pose[:2] + steps[:, None] * along + aside * across
+        starts = np.column_stack([at, np.full(len(at), tracked.pose[2])])
         return self._reached(seen, starts)
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
         p = self.parameters
-        oriented, _ = points_on_lines(known, p.line_spacing)
-        starts = []
-        for found in correspond(known, seen.lines, p.correspondence):
-            partners_of = np.flatnonzero(found.corresponding.any(axis=1))
-            target = Target.of(
-                oriented.at(np.isin(oriented.polyline, partners_of)), p.local_map.icp
-            )
-            moving = seen.on_lines
-            fit = align(moving, target, found.transform, p.local_map.icp, None, found.corresponding)
-            starts.append(fit.pose)
-        return np.array(starts).reshape(-1, 3)
+        found = shape_starts(seen, known, p.line_spacing, p.local_map.icp, p.correspondence)
+        return np.array(list(found)).reshape(-1, 3)
 
     def _aligned(self, seen: Observation, starts: FloatArray) -> list[ScanMatch]:
         """Align from each of `starts` (k, 3), and judge where that ends."""
@@ -324,7 +336,7 @@ class Tracker:
             thinned, self._local.target, starts, p.local_map.icp, self._prior, share=p.promising
         )
         poses = np.array([fit.pose for fit in fits])
-        judged = self._local.evidence(seen.scan, oriented, poses)
+        judged = self._local.evidence(seen.scan, oriented, seen.loose[: len(oriented)], poses)
         since = len(self.missed), self._told(seen.scan)
         steps = se2.between(self.pose, poses)
         return [

@@ -126,7 +126,8 @@ def test_as_many_points_speak_for_and_against_a_pose(seed: int, count: int, size
         for points, views in ((known, viewpoints), (twin, twin_viewpoints)):
             points.add(*block)
             views.add(*scan)
-    asked = (*oriented(rng, size, 6.0), rng.uniform(-3, 3, (4, 3)))
+    loose = rng.random(size) < 0.3
+    asked = (*oriented(rng, size, 6.0), loose, rng.uniform(-3, 3, (4, 3)))
     limits = EvidenceSettings(0.4, 0.3, 3, 2.0, 5.0, 0.7)
     found = COMPILED.pose_evidence(known, viewpoints, *asked, evidence_settings(limits))
     np.testing.assert_array_equal(found, pose_evidence_numpy(twin, twin_viewpoints, *asked, limits))

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.tracking.acceptance import AcceptanceParameters, ScanMatch, tell_apart
+from mapweave.mapping.tracking.acceptance import (
+    AcceptanceParameters,
+    ScanMatch,
+    is_acceptable,
+    is_ambiguous,
+    tell_apart,
+)
 from mapweave.mapping.tracking.local_map import ScanEvidence
 
 P = AcceptanceParameters()
@@ -45,3 +51,58 @@ def test_nothing_counts_where_a_different_pose_is_worth_more(turn: float) -> Non
 def test_a_pose_next_to_the_best_is_not_different() -> None:
     best, near = pose(0.5, 0.7), pose(0.7, 0.75, information=OPEN)
     assert tell_apart([best, near], P.novelty, P) == [best]
+
+
+def disputed_leap(leap: float, information: FloatArray) -> ScanMatch:
+    """Return a pose that a fifth of what is seen disputes, a leap away."""
+    evidence = ScanEvidence(0.72, 0.16, 0.0)
+    return ScanMatch(np.zeros(3), evidence, information, surprise=leap, leap=leap)
+
+
+def test_what_explains_half_and_is_held_may_be_disputed_and_take_a_leap() -> None:
+    there = disputed_leap(0.09, HELD)
+    assert is_acceptable(there, [there], P)
+    assert not is_acceptable(there, [there, pose(1.5, 0.6)], P)  # a look-alike
+    slid, far = disputed_leap(0.09, OPEN), disputed_leap(0.12, HELD)
+    assert not is_acceptable(slid, [slid], P)
+    assert not is_acceptable(far, [far], P)
+
+
+def leapt(x: float, explained: float, *, turn: float = 0.0, information: FloatArray) -> ScanMatch:
+    """Return a remarkable pose."""
+    evidence = ScanEvidence(explained, 0.0, 0.0)
+    return ScanMatch(np.array([x, 0.0, turn]), evidence, information, surprise=0.08)
+
+
+def test_what_is_remarkable_must_be_worth_clearly_more_than_look_alikes() -> None:
+    best = leapt(0.0, 0.8, information=HELD)
+    assert not is_ambiguous(best, [best, leapt(1.5, 0.5, information=HELD)], 0.0, P)
+    assert is_ambiguous(best, [best, leapt(1.5, 0.78, information=HELD)], 0.0, P)
+    expected = pose(0.0, 0.8)
+    assert not is_ambiguous(expected, [expected, leapt(1.5, 0.78, information=HELD)], 0.0, P)
+
+
+def test_elsewhere_along_an_open_direction_is_no_look_alike() -> None:
+    along_y = np.diag([30.0, 0.2, 50.0])
+    best = leapt(0.0, 0.8, information=along_y)
+    slid = ScanMatch(np.array([0.1, 2.0, 0.0]), best.evidence, along_y, surprise=0.08)
+    aside = ScanMatch(np.array([1.0, 0.0, 0.0]), best.evidence, along_y, surprise=0.08)
+    assert not is_ambiguous(best, [best, slid], 0.0, P)
+    assert is_ambiguous(best, [best, aside], 0.0, P)
+
+
+def test_in_a_bare_corridor_nobody_is_believed_to_have_turned_round() -> None:
+    back = leapt(0.0, 0.9, turn=2.0, information=OPEN)
+    assert is_ambiguous(back, [back], 2.0, P)
+    held = leapt(0.0, 0.9, turn=2.0, information=HELD)
+    assert not is_ambiguous(held, [held], 2.0, P)
+
+
+def test_what_may_have_come_since_does_not_hide_where_the_robot_is() -> None:
+    """Half of what is seen are people: of the rest nearly all is explained."""
+    people, boxes = ScanEvidence(0.48, 0.5, 0.0, 0.48), ScanEvidence(0.48, 0.5, 0.0)
+    among, blocked = (ScanMatch(np.zeros(3), each, HELD) for each in (people, boxes))
+    assert is_acceptable(among, [among], P) and tell_apart([among], P.novelty, P) == [among]
+    assert not is_acceptable(blocked, [blocked], P) and tell_apart([blocked], P.novelty, P) == []
+    elsewhere = ScanMatch(np.array([2.0, 0.0, 0.0]), people, HELD)
+    assert not is_acceptable(among, [among, elsewhere], P)

@@ -87,3 +87,23 @@ def test_unseen_a_robot_comes_no_farther_than_it_might_have_gone() -> None:
     motion_model = paced(*[STRAIGHT] * 12)
     assert 3 * 0.5 < motion_model.reach(3) < 3 * 1.0
     assert MotionModel(MotionModelParameters()).reach(1) == np.inf
+
+
+def test_for_a_robot_that_turns_unevenly_a_turn_is_no_surprise(rng: np.random.Generator) -> None:
+    """As in a log that holds one scan in four: between two of them it turned by any angle."""
+    turns = rng.uniform(-1.5, 1.5, 40)
+    uneven = paced(*[np.array([2.0, 0.0, turn]) for turn in turns])
+    steady = paced(*[np.array([2.0, 0.0, 0.0])] * 40)
+    back = np.array([2.0, 0.0, turns[-1] - 1.5]), np.array([2.0, 0.0, -1.5])
+    assert uneven.leap(back[0]) < 0.5 * steady.leap(back[1])
+
+
+@pytest.mark.parametrize(("step", "less"), [(0.4, False), (0.9, False), (3.0, True)])
+def test_how_much_is_a_leap_goes_with_the_length_of_steps(step: float, less: bool) -> None:
+    own = paced(*[np.array([step, 0.0, 0.0])] * 20)
+    short = paced(*[np.array([0.1, 0.0, 0.0])] * 20)
+    off, short_off = (
+        model.leap(at + np.array([1.0, 0.0, 0.0]))
+        for model, at in ((own, np.array([step, 0.0, 0.0])), (short, np.array([0.1, 0.0, 0.0])))
+    )
+    assert off < 0.5 * short_off if less else off == pytest.approx(short_off)

@@ -9,7 +9,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.local_map import ScanEvidence
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
-from mapweave.mapping.tracking.tracker import Tracker
+from mapweave.mapping.tracking.tracker import Tracker, TrackerParameters
 from mapweave.maps import LineMap
 from mapweave.scan.points import OrientedPoints, points_on_lines
 from mapweave.scan.scan import Scan
@@ -96,7 +96,7 @@ def test_a_leap_farther_than_the_search_reaches_is_found_by_the_shapes_of_the_ma
     around = [cast(WALLS, [*start[:2], a], noise=rng) for a in np.linspace(0, 2 * np.pi, 13)]
     leapt = observed(cast(WALLS, np.add(start, leap), noise=rng))
     known = line_map(se2.transform_segments(se2.inverse(start), WALLS))
-    with_shapes, without = Tracker(), Tracker()
+    with_shapes, without = (Tracker(TrackerParameters(widest=1.2)) for _ in range(2))
     for tracker in (with_shapes, without):
         tracked_along(tracker, around)
     [(_, tracked)] = with_shapes.place(leapt, lambda: known)
@@ -132,10 +132,11 @@ def test_what_shapes_propose_is_aligned_to_corresponding_polylines_alone(
     oriented = OrientedPoints(on_polylines.points, on_polylines.normals, segment)
     scan = cast(WALLS, [9, 1, 0])
     found = ScanSegments(lines.segments, np.full(len(scan.ranges), -1))
-    seen = Observation(scan, found, oriented, oriented, 0.5)
+    fixed = np.zeros(len(oriented), dtype=np.bool_)
+    seen = Observation(scan, found, oriented, oriented, fixed, 0.5)
     np.testing.assert_array_equal(seen.lines.segments, lines.segments)
     near = Correspondence(np.array([0.0, 0.2, 0.0]), np.eye(2, dtype=np.bool_))
-    monkeypatch.setattr("mapweave.mapping.tracking.tracker.correspond", lambda *_: [near])
+    monkeypatch.setattr("mapweave.mapping.tracking.shape_starts.correspond", lambda *_: [near])
     [start] = Tracker()._shape_starts(seen, known)
     np.testing.assert_allclose(start, 0.0, atol=0.01)
 
@@ -186,6 +187,18 @@ def test_evidence_counts_for_and_against() -> None:
     assert blocked.evidence.score < again.evidence.score - 0.05
 
 
+@pytest.mark.parametrize("half", [0.1, 0.3, 0.45])
+def test_what_stands_free_and_is_short_may_have_come_since(half: float) -> None:
+    person = np.array([[11.0, 1 + half, 11, 1 - half]])
+    tracker = Tracker()
+    tracked_along(tracker, [cast(WALLS, [9, 1.0, 0]), cast(WALLS, [9.4, 1.0, 0])])
+    found = placed(tracker, cast(np.vstack([WALLS, person]), [9.2, 1, 0]))
+    assert found is not None
+    assert found.evidence.excused == found.evidence.contradicted > 0
+    assert found.evidence.without_excused.contradicted == 0
+    assert found.evidence.without_excused.score > max(0.9, found.evidence.score)
+
+
 def test_a_wall_that_the_scan_sees_through_speaks_against_its_pose() -> None:
     """A box in the corridor, seen twice, is gone: what was known there is seen through."""
     box = np.array([[11.0, 1.3, 11, 0.7]])  # faces the robot
@@ -208,7 +221,7 @@ def test_an_older_scan_is_placed_without_moving_the_track(rng: Generator) -> Non
     place = np.array([5.0, 1.2, 0.4])
     older = cast(WALLS, place, noise=rng)
     near = se2.between(true[0], se2.compose(place, [0.4, -0.3, 0.3]))
-    found = tracker.revisit(observed(older), near)
+    found = tracker.revisit(observed(older), near, 1.2)
     assert found is not None
     off = se2.between(se2.between(true[0], place), found.pose)
     assert np.hypot(off[0], off[1]) < 0.1 and abs(off[2]) < 0.02
@@ -240,7 +253,7 @@ def test_a_missed_scan_is_placed_when_those_after_it_have_shown_what_it_saw(
 ) -> None:
     """Round a corner into a room nobody had looked into, and back to where both are in sight."""
     way = [[x, 1.0, 0.0] for x in np.arange(6, 12.6, 0.5)]
-    tracker = Tracker()
+    tracker = Tracker(TrackerParameters(widest=1.2))
     tracked_along(tracker, [cast(WALLS, pose, noise=rng) for pose in way])
     inside = np.array([12.5, -1.0, -np.pi / 2])
     missed = observed(cast(WALLS, inside, noise=rng, angles=FRONT[45:136]))
