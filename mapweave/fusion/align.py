@@ -70,7 +70,7 @@ class FusionParameters(StageParameters):
     rooms: RoomParameters = RoomParameters()
     places: PlaceParameters = derived(
         lambda c: PlaceParameters.of(
-            c, verification=VerificationParameters.of(c, contradiction_weight=5.0)
+            c, verification=VerificationParameters.of(c, contradiction_weight=5.0, moved_weight=0.1)
         )
     )
     decision: DecisionParameters = derived(DecisionParameters.of)

@@ -14,7 +14,7 @@ from mapweave.fusion.extrapolation import ExtrapolationParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.matching.distance_field import DistanceField
-from mapweave.matching.verification import VerificationParameters, contradicting
+from mapweave.matching.verification import VerificationParameters, contradicting, worth_of_missing
 
 LIKELY = 1.64  # standard deviations towards the free space, of which 19 of 20 are no more
 
@@ -64,4 +64,5 @@ def _one_way(
     apart, _ = scipy.spatial.KDTree(shared).query(points)
     _, _, depth = reference.look_up(se2.transform_points(transform, points))
     deep = depth > v.clearance + LIKELY * p.bend * np.minimum(apart, p.most)
-    return float(other.weight[against][deep].sum())
+    metres = other.weight * worth_of_missing(other, v)
+    return float(metres[against][deep].sum())
