@@ -12,7 +12,7 @@ SOURCES := pyproject.toml README.md LICENSE \
 TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
 
 .PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
-.PHONY: bench-speed bench-faults bench-live bench-robots bench-shape bench-robots
+.PHONY: bench-speed bench-faults bench-live bench-robots bench-shape
 .PHONY: clean distclean mutations
 
 $(STAMP): pyproject.toml

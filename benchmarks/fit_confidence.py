@@ -1,11 +1,9 @@
 """Confidence: fits its models on the pairs of `fusion`, and reports on buildings held out.
 
 The model answers for the best hypothesis of a pair, so each pair counts once: its best hypothesis,
-accepted or not, and whether that was right within 0.5 m and 5°. Two models answer: one whether the
-place is right, the other whether maps, which are bent, are right as wholes there. The first is
-fitted to places, where what maps may be bent by is allowed for, the second to how far off the joins
-are. Maps that are bent by more than 0.5 m in themselves teach nothing of places; they are reported
-on all the same.
+accepted or not, and whether that was right within 0.5 m and 5° where both looked. How much maps are
+bent beyond is fitted to how far off the joins are as wholes. Maps that are bent by more than 0.5 m
+in themselves teach nothing; they are reported on all the same.
 """
 
 import argparse
@@ -27,17 +25,15 @@ from benchmarks.logistic import (
     fit_logistic,
     reliability,
 )
-from benchmarks.pairs import RIGHT_DISTANCE, RIGHT_TURN
 from benchmarks.reach_fit import fit_reach
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.fusion.align import FusionParameters
 from mapweave.fusion.confidence import ConfidenceParameters, features, share
-from mapweave.fusion.extrapolation import ExtrapolationParameters, holds
+from mapweave.fusion.extrapolation import ExtrapolationParameters
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.matching.verification import Verdict
 
 MAX_BEND = 0.5  # [m] rms of the maps that the model is fitted to
-MOST_BENT = 0.07  # [m] off for each metre of reach that a right place may be
 NAMES = ("score", "held", "overlap", "lead")  # of the slopes, as in `features`
 
 
@@ -57,12 +53,10 @@ class Examples:
         (n,) how far off it is at the median over the map [m].
     right
         (n,)
-    right_place
-        (n,) the same, but for what the maps may be bent by.
     accepted
         (n,)
     placed
-        (n,) whether it was accepted, or only the reach kept it from that: within one building.
+        (n,) whether it was accepted, within one building.
     bend
         (n,) of the worse map of the two [m].
     buildings
@@ -74,7 +68,6 @@ class Examples:
     reach: FloatArray
     distance: FloatArray
     right: BoolArray
-    right_place: BoolArray
     accepted: BoolArray
     placed: BoolArray
     bend: FloatArray
@@ -102,7 +95,7 @@ def run(options: argparse.Namespace) -> None:
     """Report on held-out buildings, then fit on all and print what to paste."""
     examples = read_examples(options.rows)
     held_out = predict_held_out(examples)
-    present = _said(examples, _present_model(), ExtrapolationParameters())
+    present = _said(examples, _present_model())
     for name, said in (("present coefficients", present), ("fitted, held out", held_out)):
         print(tell(name, said, examples))
     bins = reliability(held_out, examples.right)
@@ -128,9 +121,8 @@ def read_examples(file: Path) -> Examples:
         np.array([features(*pair) for pair in verdicts]),
         np.array([share(*pair, ConfidenceParameters()) for pair in verdicts]),
         np.array([_number(row["evidence"].get("reach")) for row in rows]),
-        np.array([_number(row["distance"]) for row in rows]),
+        np.array([_number(row["whole"]) for row in rows]),
         np.array([row["right"] for row in rows], dtype=np.bool_),
-        np.array([_is_right_place(row) for row in rows], dtype=np.bool_),
         np.array([row["decision"] == "accepted" for row in rows], dtype=np.bool_),
         np.array([_is_placed(row) for row in rows], dtype=np.bool_),
         np.array([max(row["bends"]) for row in rows]),
@@ -141,15 +133,6 @@ def read_examples(file: Path) -> Examples:
 def _number(value: float | None) -> float:
     """Infinite where there is none: nothing is shared, or buildings differ."""
     return np.inf if value is None else value
-
-
-def _is_right_place(row: dict[str, Any]) -> bool:
-    far = _number(row["evidence"].get("reach"))
-    bent = MOST_BENT * far if np.isfinite(far) else 0.0
-    turned: float = row["turn"]
-    return row["right"] or (
-        turned <= RIGHT_TURN and _number(row["distance"]) <= RIGHT_DISTANCE + bent
-    )
 
 
 def _is_placed(row: dict[str, Any]) -> bool:
@@ -177,13 +160,12 @@ def predict_held_out(examples: Examples) -> FloatArray:
         asked = np.array([each == pair for each in examples.buildings])
         seen = ~(examples.touches(pair[0]) | examples.touches(pair[1]))
         model = _fit(examples, seen & examples.sound)
-        bent = _fit_reach(examples, seen)
-        said[asked] = _said(examples, model, bent)[asked]
+        said[asked] = _said(examples, model)[asked]
     return said
 
 
 def _fit(examples: Examples, chosen: BoolArray) -> Logistic:
-    return fit_logistic(examples.features[chosen], examples.right_place[chosen])
+    return fit_logistic(examples.features[chosen], examples.right[chosen])
 
 
 def _fit_reach(examples: Examples, chosen: BoolArray) -> ExtrapolationParameters:
@@ -194,10 +176,9 @@ def _fit_reach(examples: Examples, chosen: BoolArray) -> ExtrapolationParameters
     return ExtrapolationParameters(exact=exact, bend=bend)
 
 
-def _said(examples: Examples, model: Logistic, bent: ExtrapolationParameters) -> FloatArray:
+def _said(examples: Examples, model: Logistic) -> FloatArray:
     """Return the (n,) confidences."""
-    held = np.array([holds(far, bent) for far in examples.reach])
-    return np.asarray(model.predict(examples.features) * examples.share * held)
+    return np.asarray(model.predict(examples.features) * examples.share)
 
 
 def _tell_bends(examples: Examples) -> str:

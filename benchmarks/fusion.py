@@ -158,6 +158,7 @@ def _match_row(match: Match) -> dict[str, object]:
         "transform": a.transform.tolist(),
         "distance": match.distance if math.isfinite(match.distance) else None,
         "turn": match.turn,
+        "whole": match.whole if math.isfinite(match.whole) else None,
         "right": match.right,
         "bends": match.bends,
     }

@@ -9,13 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks.meetings import meeting_error
 from benchmarks.stretches import Stretch, alignment_error, common
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.maps import Alignment
 
 Outcome = Literal["joined right", "joined wrong", "ambiguous", "refused"]
 
-RIGHT_DISTANCE, RIGHT_TURN = 0.5, math.radians(5.0)  # [m] at the median over the map, [rad]
+RIGHT_DISTANCE, RIGHT_TURN = 0.5, math.radians(5.0)  # [m], [rad] at the median
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +26,9 @@ class Match:
     Attributes
     ----------
     distance, turn
-        How far off it is [m], [rad]; infinite and pi across buildings.
+        How far off it is where the robots met [m], [rad]; infinite and pi across buildings.
+    whole
+        How far off it is at the median over the map, as one rigid piece [m].
     bends
         [m] rms by which the two maps are bent themselves.
     right
@@ -35,6 +38,7 @@ class Match:
     alignment: Alignment
     distance: float
     turn: float
+    whole: float
     bends: tuple[float, float]
     right: bool
 
@@ -123,8 +127,10 @@ def is_right(distance: float, turn: float) -> bool:
 
 def _judge(first: Stretch, second: Stretch, alignment: Alignment) -> Match:
     reference, other = first.parts[alignment.reference], second.parts[alignment.other]
-    distance, turn = math.inf, math.pi
+    distance, turn, whole = math.inf, math.pi, math.inf
     if first.log.building == second.log.building:
-        distance, turn = alignment_error(reference, other, alignment.transform)
+        maps = first.robot_map, second.robot_map
+        distance, turn = meeting_error(reference, other, maps, alignment)
+        whole, _ = alignment_error(reference, other, alignment.transform)
     right = is_right(distance, turn)
-    return Match(alignment, distance, turn, (reference.bend, other.bend), right)
+    return Match(alignment, distance, turn, whole, (reference.bend, other.bend), right)

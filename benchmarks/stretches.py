@@ -1,7 +1,7 @@
 """Logs cut into consecutive stretches, each mapped as if by a robot of its own."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -29,11 +29,15 @@ class Part:
         [m] rms that its scans are off in that frame: what an alignment cannot mend.
     ends
         (2n, 2) of its segments, component's frame [m].
+    seen, true
+        (m, 3) poses of its scans in its frame and in the log's corrected one; NaN where unknown.
     """
 
     frame: FloatArray
     bend: float
     ends: FloatArray
+    seen: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    true: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +95,8 @@ def _parts(robot_map: RobotMap, truth: FloatArray) -> dict[str, Part]:
         frame = true_frame(path, truth)
         ends = robot_map.lines(path.component).segments.reshape(-1, 2)
         name = component_name(robot_map.robot, path.component)
-        parts[name] = Part(frame, position_error(path, truth), ends)
+        error = position_error(path, truth)
+        parts[name] = Part(frame, error, ends, path.pose, truth[path.index])
     return parts
 
 

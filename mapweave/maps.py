@@ -201,6 +201,27 @@ class RobotMap:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SharedPlace:
+    """A place that two components saw: there an alignment is exact, however bent the maps are.
+
+    Attributes
+    ----------
+    reference, other
+        The ids of a submap of each component.
+    transform
+        (3,) from the frame of `other` to that of `reference` [m, m, rad]: it stays, whatever
+        becomes of the submaps' poses.
+    at
+        (2,) the middle of the wall that both saw, frame of the alignment's reference [m].
+    """
+
+    reference: int
+    other: int
+    transform: FloatArray
+    at: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
     """A rigid transform between two components, with its evidence.
 
@@ -213,7 +234,7 @@ class Alignment:
     decision
         Accepted, ambiguous or refused.
     confidence
-        Probability that the transform is right within 0.5 m and 5°, at the median over the map.
+        Probability that the transform is right within 0.5 m and 5° where both looked.
     cause
         Why it was decided so: a kind and its numbers.
     evidence
@@ -222,6 +243,8 @@ class Alignment:
         The best *different* hypothesis, where there is any.
     status
         What became of it in a joint map; None outside, and of what never was accepted.
+    places
+        Where it holds, those with the most wall in common first. Beyond, maps are bent.
     """
 
     reference: str
@@ -233,6 +256,7 @@ class Alignment:
     evidence: Evidence = field(default_factory=Evidence)
     runner_up: RunnerUp | None = None
     status: Status | None = None
+    places: tuple[SharedPlace, ...] = ()
 
     @property
     def reason(self) -> str:

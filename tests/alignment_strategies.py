@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from mapweave.evidence import Evidence, RunnerUp
-from mapweave.maps import Alignment, Decision
+from mapweave.maps import Alignment, Decision, SharedPlace
 from mapweave.reasons import MAX_DEPTH, Pair, Reason, ReasonKind, Status, StatusKind
 
 NUMBERS = st.floats(-1e6, 1e6)
@@ -74,6 +74,14 @@ def evidences() -> st.SearchStrategy[Evidence]:
 
 
 @st.composite
+def places(draw: st.DrawFn) -> SharedPlace:
+    """Draw a place where an alignment holds."""
+    x, y = draw(st.integers(-9999, 9999)) / 100, draw(st.integers(-9999, 9999)) / 1000
+    ids = st.integers(0, 4095)
+    return SharedPlace(draw(ids), draw(ids), np.array([y, x, 0.125]), np.array([x, 2.5]))
+
+
+@st.composite
 def alignments(draw: st.DrawFn) -> Alignment:
     """Draw an alignment with all that it may have."""
     decision: Decision = draw(st.sampled_from(["accepted", "ambiguous", "refused"]))
@@ -89,4 +97,5 @@ def alignments(draw: st.DrawFn) -> Alignment:
         draw(evidences()),
         draw(st.sampled_from([None, rival])),
         draw(st.none() | statuses()),
+        draw(st.lists(places(), max_size=3).map(tuple)),
     )

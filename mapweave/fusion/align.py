@@ -3,29 +3,29 @@
 In the order of the paper: hypothesise (H1, H2: by shape, corners and parallel walls, all at once),
 align (V1), verify (V2: by all that both maps saw, free space included), decide. The loop as it is
 printed is `mapweave.fusion.reference`; docs/paper.md says what was changed and why. Where whole
-maps cannot be joined their parts are compared: maps may be bent. So an alignment of the right
-places is accepted only as far as it is right for the rest of the maps as well.
+maps cannot be joined they are compared about places: maps may be bent. So an alignment is right
+where both looked, and says where that is.
 """
 
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from pydantic import Field
 
 from mapweave.config import Config
+from mapweave.fusion.component import Component
 from mapweave.fusion.confidence import ConfidenceParameters, confidence
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
-from mapweave.fusion.parts import PartParameters, agreed, cut
+from mapweave.fusion.places import PlaceParameters, compare_at_places, located
 from mapweave.fusion.rooms import RoomParameters, outside
 from mapweave.geometry import se2
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
-from mapweave.maps import Alignment, LineMap, RobotMap, component_name
+from mapweave.maps import Alignment, LineMap, RobotMap
 from mapweave.matching.distance_field import DistanceFieldParameters
 from mapweave.matching.hypotheses import (
     HypothesisParameters,
@@ -68,7 +68,11 @@ class FusionParameters(StageParameters):
     loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
     confidence: ConfidenceParameters = ConfidenceParameters()
     rooms: RoomParameters = RoomParameters()
-    parts: PartParameters = derived(PartParameters.of)
+    places: PlaceParameters = derived(
+        lambda c: PlaceParameters.of(
+            c, verification=VerificationParameters.of(c, contradiction_weight=5.0, moved_weight=0.1)
+        )
+    )
     decision: DecisionParameters = derived(DecisionParameters.of)
     reach: ExtrapolationParameters = ExtrapolationParameters()
     min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
@@ -110,7 +114,10 @@ def align(
     for name, value in (("reference", reference), ("other", other)):
         check_kind(name, value, RobotMap)
     p = _parameters(parameters, config)
-    ours, theirs = ([_Component(m, c, p) for c in m.components] for m in (reference, other))
+    ours, theirs = (
+        [Component(m, c, lambda lines: prepare(lines, p)) for c in m.components]
+        for m in (reference, other)
+    )
     return [_align(a, b, p) for a, b in itertools.product(ours, theirs)]
 
 
@@ -124,60 +131,47 @@ def _parameters(parameters: FusionParameters | None, config: Config | None) -> F
     return FusionParameters.of(config)
 
 
-class _Component:
-    """A component of a robot's map, prepared as a whole and, where it is asked for, in parts."""
+def _align(first: Component, second: Component, p: FusionParameters) -> Alignment:
+    """Compare two components; at places, where as wholes they cannot be joined: they may be bent.
 
-    def __init__(self, robot_map: RobotMap, number: int, p: FusionParameters) -> None:
-        self._robot_map, self._number, self._p = robot_map, number, p
-        self.name = component_name(robot_map.robot, number)
-        self.whole = prepare(robot_map.lines(number), p)
-
-    @cached_property
-    def parts(self) -> list[PreparedMap]:
-        """Those with enough wall to compare."""
-        cuts = cut(self._robot_map, self._number, self._p.parts)
-        shapes = [prepare(lines, self._p) for lines in cuts] if len(cuts) > 1 else [self.whole]
-        return [shape for shape in shapes if shape is not None]
-
-
-def _align(first: _Component, second: _Component, p: FusionParameters) -> Alignment:
-    """Compare two components; in parts, where as wholes they cannot be joined: they may be bent."""
-    whole = compare(first.name, first.whole, second.name, second.whole, p)
-    found = whole if whole.decision == "accepted" else _in_parts(first, second, p) or whole
-    return _for_wholes(found, first.whole, second.whole, p)
-
-
-def _in_parts(first: _Component, second: _Component, p: FusionParameters) -> Alignment | None:
-    """Return the alignment that parts of two components agree about; None if there is none."""
-    pairs = list(itertools.product(first.parts, second.parts))
-    if len(pairs) < 2:
-        return None
-    found = [(compare(first.name, a, second.name, b, p), b) for a, b in pairs]
-    joined = [
-        (x, b.raster.oriented.points.mean(axis=0)) for x, b in found if x.decision == "accepted"
-    ]
-    return agreed([x for x, _ in joined], np.array([m for _, m in joined]), p.parts)
+    Where they may be bent by more than the tolerance, what fits as wholes may be a look-alike: then
+    places must agree as well.
+    """
+    ours, theirs = first.whole, second.whole
+    if ours is None or theirs is None:
+        shapes = [None if window is None else window.shape for window in (ours, theirs)]
+        return compare(first.name, shapes[0], second.name, shapes[1], p)
+    whole = compare(first.name, ours.shape, second.name, theirs.shape, p)
+    if whole.decision == "accepted" and _is_rigid(whole, ours.shape, theirs.shape, p):
+        return _at_place(located(whole, ours, theirs, p.places), ours.shape, theirs.shape, p)
+    found = compare_at_places(
+        first,
+        second,
+        None if whole.evidence.is_empty else whole,
+        p.places,
+        lambda a, b: compare(first.name, a.shape, second.name, b.shape, p),
+    )
+    return _at_place(found or whole, ours.shape, theirs.shape, p)
 
 
-def _for_wholes(
-    found: Alignment, first: PreparedMap | None, second: PreparedMap | None, p: FusionParameters
+def _is_rigid(whole: Alignment, a: PreparedMap, b: PreparedMap, p: FusionParameters) -> bool:
+    """Whether maps are right as wholes where they are right at the place, as far as they reach."""
+    far = reach(a.raster, b.raster, whole.transform, p.verification)
+    return whole.confidence * holds(far, p.reach) >= p.decision.min_confidence
+
+
+def _at_place(
+    found: Alignment, a: PreparedMap | None, b: PreparedMap | None, p: FusionParameters
 ) -> Alignment:
-    """Return `found` with the confidence that it is right for the maps as wholes, which are bent.
+    """Return `found` with how far the maps go on from there: what is off beyond is others' matter.
 
     Where the place was proven, its evidence tells how sure that is.
     """
-    if first is None or second is None or found.evidence.is_empty:
+    if a is None or b is None or found.evidence.is_empty:
         return found
-    far = reach(first.raster, second.raster, found.transform, p.verification)
-    sure = found.confidence * holds(far, p.reach)
-    if found.decision != "accepted":
-        return replace(found, confidence=sure, evidence=replace(found.evidence, reach=far))
-    measured = replace(found.evidence, reach=far, place=found.confidence)
-    if sure >= p.decision.min_confidence:
-        return replace(found, confidence=sure, evidence=measured)
-    numbers = {"reach": far, "tolerance": p.reach.tolerance, "confidence": sure}
-    cause = Reason(ReasonKind.BENT, numbers, found.cause)
-    return replace(found, decision="ambiguous", confidence=sure, cause=cause, evidence=measured)
+    far = reach(a.raster, b.raster, found.transform, p.verification)
+    place = found.confidence if found.decision == "accepted" else None
+    return replace(found, evidence=replace(found.evidence, reach=far, place=place))
 
 
 def align_maps(
@@ -189,7 +183,7 @@ def align_maps(
     p = parameters or FusionParameters()
     (a, first), (b, second) = reference, other
     prepared = prepare(first, p), prepare(second, p)
-    return _for_wholes(compare(a, prepared[0], b, prepared[1], p), *prepared, p)
+    return _at_place(compare(a, prepared[0], b, prepared[1], p), *prepared, p)
 
 
 def prepare(lines: LineMap, p: FusionParameters) -> PreparedMap | None:

@@ -264,6 +264,8 @@ def alignment_content(alignment: Alignment) -> dict[str, object]:
         "runner_up": _runner_up(alignment.runner_up),
         **_status(alignment.status),
         "cause": _cause(alignment.cause),
+        "anchors": [[p.reference, p.other, *_pose(p.transform)] for p in alignment.places],
+        "at": [_metres(place.at) for place in alignment.places],
     }
 
 

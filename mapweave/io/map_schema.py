@@ -23,6 +23,7 @@ from mapweave.maps import (
     LineMap,
     MadeWith,
     RobotMap,
+    SharedPlace,
     Submap,
     Trajectory,
 )
@@ -227,6 +228,16 @@ class AlignmentFile(FileModel):
     set_aside_by: list[tuple[ComponentName, ComponentName]] = Field(default_factory=list)
     revoked_in: Count | None = None
     cause: CauseFile | None = None
+    anchors: list[tuple[Count, Count, Metre, Metre, float]] = Field(default_factory=list)
+    at: list[tuple[Metre, Metre]] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _anchors_fit(self) -> "AlignmentFile":
+        if len(self.at) != len(self.anchors):
+            raise ValueError(
+                f"at: expected as many places as anchors, {len(self.anchors)}, got {len(self.at)}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _status_fits(self) -> "AlignmentFile":
@@ -250,6 +261,10 @@ class AlignmentFile(FileModel):
             evidence=Evidence.of(self.evidence.numbers()),
             runner_up=None if self.runner_up is None else self.runner_up.to_runner_up(),
             status=None if cause is None else self._status(),
+            places=tuple(
+                SharedPlace(reference, other, np.array(pose), np.array(at))
+                for (reference, other, *pose), at in zip(self.anchors, self.at, strict=True)
+            ),
         )
 
     def _status(self) -> Status | None:

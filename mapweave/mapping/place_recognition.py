@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
+from mapweave.fusion.agreement import AgreementParameters, difference
 from mapweave.fusion.align import FusionParameters, compare, prepare
-from mapweave.fusion.parts import PartParameters, difference
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Submap, lines_of
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.matching.verification import verify
-from mapweave.parameters import StageParameters, derived
+from mapweave.parameters import StageParameters
 
 
 class PlaceRecognitionParameters(StageParameters):
@@ -26,7 +26,7 @@ class PlaceRecognitionParameters(StageParameters):
 
     submaps: int = Field(3, ge=1, description="that are rigid together, some 36 m of path")
     asked: int = Field(4, ge=1, description="components looked in, the ones of most submaps")
-    agreement: PartParameters = derived(PartParameters.of)
+    agreement: AgreementParameters = AgreementParameters()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

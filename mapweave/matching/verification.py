@@ -135,7 +135,7 @@ def _coarse_one_way(
     shift = (transforms[:, :2] - reference.origin) / reference.cell
     turn = angle * np.float32(DIRECTIONS / (2 * np.pi))
     motions = np.column_stack([np.cos(angle), np.sin(angle), shift.astype(np.float32), turn])
-    codes, missing = _codes(reference, p), _worth_of_missing(other, p)[::stride]
+    codes, missing = _codes(reference, p), worth_of_missing(other, p)[::stride]
     scores = np.zeros(len(transforms))
     for each in np.unique(missing):
         some, worth = missing == each, _worth(p, float(each))
@@ -258,11 +258,11 @@ def _one_way(
         contradicts,
         distance[coincides].astype(np.float64),
         float(other.weight[coincides].sum()),
-        float((other.weight * _worth_of_missing(other, p))[contradicts].sum()),
+        float((other.weight * worth_of_missing(other, p))[contradicts].sum()),
     )
 
 
-def _worth_of_missing(other: DistanceField, p: VerificationParameters) -> FloatArray:
+def worth_of_missing(other: DistanceField, p: VerificationParameters) -> FloatArray:
     """(n,) what a metre of wall counts that is not there: a wall that is gone, in full."""
     if p.moved_weight == 1:
         return np.ones(len(other.weight))

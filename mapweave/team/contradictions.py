@@ -5,7 +5,7 @@ saw through speak against one of the alignments between them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import inf
 from typing import TypeAlias
@@ -13,10 +13,16 @@ from typing import TypeAlias
 import numpy as np
 from pydantic import Field
 
+from mapweave.fusion.beyond import contradicted_beyond
+from mapweave.fusion.extrapolation import ExtrapolationParameters
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import FloatArray, Int32Array
 from mapweave.matching.distance_field import DistanceField
-from mapweave.matching.verification import Verdict, VerificationParameters, verify
+from mapweave.matching.verification import (
+    Verdict,
+    VerificationParameters,
+    verify,
+)
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.cycles import Edge, poses_along
 from mapweave.team.min_cut import groups
@@ -32,6 +38,7 @@ class ContradictionParameters(StageParameters):
     """
 
     verification: VerificationParameters = derived(VerificationParameters.of)
+    bends: ExtrapolationParameters = ExtrapolationParameters()
     allowance: float = Field(
         0.25,
         ge=0,
@@ -45,8 +52,10 @@ class ContradictionParameters(StageParameters):
     turn_step: float = Field(0.01, gt=0, description="[rad] as well")
 
 
-# By both rasters, and the transform in thousandths of the steps.
-KnownVerdicts: TypeAlias = Recent[tuple[DistanceField, DistanceField, int, int, int], Verdict]
+# By both rasters, the transform in thousandths of the steps, and the places that hold them.
+KnownVerdicts: TypeAlias = Recent[
+    tuple[DistanceField, DistanceField, int, int, int, bytes], Verdict
+]
 PARTS = 1000  # of a step, to which a transform is rounded when it is judged
 
 
@@ -92,11 +101,23 @@ class PairVerdicts:
     ) -> None:
         self._rasters, self._frames, self._p = rasters, frames, parameters
         self._verdicts: KnownVerdicts = Recent() if known is None else known
-        self._known: dict[tuple[int, ...], PairVerdict | None] = {}
+        self._known: dict[tuple[int | bytes, ...], PairVerdict | None] = {}
         self._reach = {k: _reach(raster, frames[k]) for k, raster in rasters.items()}
 
-    def ask(self, pairs: Sequence[tuple[int, int]], transforms: FloatArray) -> list[PairVerdict]:
-        """Return what speaks against transforms (n, 3), each of a pair's second to its first."""
+    def ask(
+        self,
+        pairs: Sequence[tuple[int, int]],
+        transforms: FloatArray,
+        held: Sequence[FloatArray],
+    ) -> list[PairVerdict]:
+        """Return what speaks against transforms (n, 3), each of a pair's second to its first.
+
+        Parameters
+        ----------
+        held
+            Of each pair (k, 2) the places that hold it [m], frame of the second's node: beyond,
+            maps may be bent. None where they are taken to be rigid.
+        """
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
         keys = np.round(transforms / steps).astype(np.int64).tolist()
         rounded = np.round(transforms / (steps / PARTS)).astype(np.int64).tolist()
@@ -106,16 +127,19 @@ class PairVerdicts:
             # What has seen no wall says nothing, nor do two that are too far apart.
             if apart[k] > self._reach.get(first, -inf) + self._reach.get(second, -inf):
                 continue
-            key = (first, second, *keys[k])
+            around = np.round(held[k] / self._p.step).astype(np.int32)
+            key = (first, second, *keys[k], around.tobytes())
             if key not in self._known:
-                self._known[key] = self._judge(first, second, rounded[k])
+                self._known[key] = self._judge(first, second, rounded[k], around)
             verdict = self._known[key]
             if verdict is not None:
                 found.append(verdict)
         return found
 
-    def _judge(self, first: int, second: int, at: Sequence[int]) -> PairVerdict | None:
-        """Judge the transform that lies `at` so many parts of the steps."""
+    def _judge(
+        self, first: int, second: int, at: Sequence[int], around: Int32Array
+    ) -> PairVerdict | None:
+        """Judge the transform that lies `at` so many parts of the steps, held `around` places."""
         p = self._p
         one, other = self._rasters[first], self._rasters[second]
         x, y, turn = at
@@ -124,14 +148,23 @@ class PairVerdicts:
             rounded = np.array(at) * np.array([p.step, p.step, p.turn_step]) / PARTS
             there = se2.compose(rounded, se2.inverse(self._frames[second]))
             pose = se2.compose(self._frames[first], there)
-            return verify(one, other, pose, p.verification)
+            found = verify(one, other, pose, p.verification)
+            if len(around) == 0 or self._excess(found) <= 0:
+                return found
+            held = se2.transform_points(self._frames[second], around * p.step)
+            left = contradicted_beyond(one, other, pose, held, p.verification, p.bends)
+            return replace(found, contradicted=left)
 
-        verdict = self._verdicts.get((one, other, x, y, turn), judge)
-        allowed = p.allowance * (max(verdict.common, 0.0) + verdict.contradicted)
-        excess = verdict.contradicted - allowed
-        return (
-            PairVerdict(first, second, verdict, excess / p.metres_per_log) if excess > 0 else None
-        )
+        verdict = self._verdicts.get((one, other, x, y, turn, around.tobytes()), judge)
+        excess = self._excess(verdict)
+        if excess <= 0:
+            return None
+        return PairVerdict(first, second, verdict, excess / p.metres_per_log)
+
+    def _excess(self, verdict: Verdict) -> float:
+        """[m] contradicted beyond what is to be expected."""
+        both = max(verdict.common, 0.0) + verdict.contradicted
+        return verdict.contradicted - self._p.allowance * both
 
 
 class MapContradictions:
@@ -156,11 +189,22 @@ class MapContradictions:
         for group in groups(self._count, self._edges, present):
             if len(group) == 1:
                 continue
-            poses, _ = poses_along(group[0], self._count, self._edges, present)
+            poses, paths = poses_along(group[0], self._count, self._edges, present)
             pairs = list(combinations(group, 2))
             first, second = np.array(pairs).T
-            found += self._witnesses.ask(pairs, se2.between(poses[first], poses[second]))
+            held = [
+                se2.transform_points(se2.inverse(poses[j]), self._held(paths[i] ^ paths[j], poses))
+                for i, j in pairs
+            ]
+            found += self._witnesses.ask(pairs, se2.between(poses[first], poses[second]), held)
         return found
+
+    def _held(self, way: int, poses: FloatArray) -> FloatArray:
+        """(k, 2) places that hold a way of edges, a bit mask; none where an edge tells of none."""
+        edges = [edge for k, edge in enumerate(self._edges) if way >> k & 1]
+        if not all(len(edge.places) for edge in edges):
+            return np.empty((0, 2))
+        return np.concatenate([se2.transform_points(poses[e.first], e.places) for e in edges])
 
 
 def _reach(raster: DistanceField, frame: FloatArray) -> float:

@@ -6,7 +6,7 @@ cycle of right alignments compose to the identity, but for what each of them err
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
@@ -47,6 +47,8 @@ class Edge:
         That it is right, before others are asked.
     bend
         [m] standard deviation along x and y that bent maps add to what it errs by.
+    places
+        (k, 2) where it holds, in the frame of the first [m]; none where that is not told.
     pinned
         Whether an operator says that it is right: then it is, whatever else is found.
     """
@@ -56,6 +58,7 @@ class Edge:
     transform: FloatArray
     confidence: float
     bend: float = 0.0
+    places: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
     pinned: bool = False
 
     @cached_property

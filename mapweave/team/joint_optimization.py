@@ -39,6 +39,11 @@ class JointOptimizationParameters(StageParameters):
         0.3, gt=0, description="[m] of an alignment where it is held: that of whole maps, bent"
     )
     alignment_turn: float = Field(0.03, gt=0, description="[rad] the same for the turn")
+    place_sigma: float = Field(0.15, gt=0, description="[m] of an alignment at a place it tells")
+    place_turn: float = Field(0.02, gt=0, description="[rad] the same for the turn")
+    rounds: int = Field(
+        4, ge=1, description="of comparing: what moved by `step` may be within reach of others"
+    )
     newest: bool = Field(
         default=False,
         description="whether the newest submap of each component is compared as well: in a running"
@@ -104,11 +109,15 @@ class JointOptimizer:
         nodes = [
             _Node.of(name, pose, s) for name, pose in cluster.poses.items() for s in submaps[name]
         ]
-        closures = list(self._closures(nodes))
-        if not closures:
-            return cluster, {name: _believed(submaps[name]) for name in cluster.poses}
-        links = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments), *closures]
-        fitted, _ = optimise(np.array([n.submap.pose for n in nodes]), links)
+        told = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments)]
+        before = fitted = np.array([n.submap.pose for n in nodes])
+        for _ in range(self._p.rounds):
+            closures = list(self._closures(_placed(nodes, fitted)))
+            if not closures and not _tell_bends(cluster, alignments):
+                return cluster, {name: _believed(submaps[name]) for name in cluster.poses}
+            before, (fitted, _) = fitted, optimise(fitted, [*told, *closures])
+            if np.hypot(*(fitted - before)[:, :2].T).max() < self._p.step:
+                break
         return _rooted(cluster, nodes, fitted)
 
     def _tracked(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
@@ -125,19 +134,22 @@ class JointOptimizer:
     def _aligned(
         self, nodes: Sequence[_Node], cluster: Cluster, alignments: Sequence[Alignment]
     ) -> Iterator[Constraint]:
-        """Yield how alignments lay those submaps to each other that are nearest.
+        """Yield how alignments lay submaps to each other: where they hold, if they tell.
 
-        Loosely: where submaps themselves were found in each other, that says more.
+        If not, those that are nearest, and loosely: where submaps themselves were found in each
+        other, that says more.
         """
-        p = self._p
-        loose = np.array([p.alignment_sigma, p.alignment_sigma, p.alignment_turn])
-        covariance = np.diag(loose**2)
-        inside = _by_component(nodes)
-        relied = [
-            a
-            for a in alignments
-            if a.decision == "accepted" and inside.get(a.reference) and inside.get(a.other)
-        ]
+        p, inside = self._p, _by_component(nodes)
+        known = [a for a in alignments if a.decision == "accepted" and a.reference in inside]
+        known = [a for a in known if a.other in inside]
+        held = [list(_held(a, nodes, inside)) for a in known]
+        exact = np.diag(np.array([p.place_sigma, p.place_sigma, p.place_turn]) ** 2)
+        for i, j, step in (each for those in held for each in those):
+            yield Constraint(i, j, step, exact, True)
+        relied = [a for a, those in zip(known, held, strict=True) if not those]
+        covariance = np.diag(
+            np.array([p.alignment_sigma, p.alignment_sigma, p.alignment_turn]) ** 2
+        )
         if not relied:
             return
         ends = [_nearest(nodes, inside[a.reference], inside[a.other]) for a in relied]
@@ -210,6 +222,37 @@ class JointOptimizer:
         older = Submap(0, 0, se2.IDENTITY, asked.older, path)
         newer = Submap(1, 0, believed, asked.newer, path)
         return self._loops.compare_two(older, newer, 0.0).link
+
+
+def _placed(nodes: Sequence[_Node], poses: FloatArray) -> list[_Node]:
+    """Return nodes at the (n, 3) `poses` in the cluster's frame."""
+    return [
+        node
+        if np.array_equal(node.submap.pose, pose)
+        else _Node.of(node.component, se2.IDENTITY, replace(node.submap, pose=pose))
+        for node, pose in zip(nodes, poses, strict=True)
+    ]
+
+
+def _tell_bends(cluster: Cluster, alignments: Sequence[Alignment]) -> bool:
+    """Whether any that are relied on lay two components on each other at several places."""
+    return any(
+        len(a.places) > 1 and a.decision == "accepted" and a.reference in cluster.poses
+        for a in alignments
+    )
+
+
+def _held(
+    alignment: Alignment, nodes: Sequence[_Node], inside: Mapping[str, Sequence[int]]
+) -> Iterator[tuple[int, int, FloatArray]]:
+    """Yield the nodes that hold an alignment, and how they lie to each other there."""
+    ours, theirs = (
+        {nodes[k].submap.id: k for k in inside[name]}
+        for name in (alignment.reference, alignment.other)
+    )
+    for place in alignment.places:
+        if place.reference in ours and place.other in theirs:
+            yield ours[place.reference], theirs[place.other], place.transform
 
 
 def _believed(submaps: Sequence[Submap]) -> FloatArray:

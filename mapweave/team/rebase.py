@@ -6,9 +6,9 @@ component. What they have in common moves with them, so the alignment is kept th
 finds that a submap is elsewhere, what was aligned by way of it is open again.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, RobotMap, Submap, parse_component
 from mapweave.reasons import Reason, ReasonKind
+
+ThenAndNow: TypeAlias = tuple["SubmapPlace", Submap]
+Known: TypeAlias = dict[int, ThenAndNow]
 
 
 class SubmapPlace(NamedTuple):
@@ -47,18 +50,45 @@ def places_of(robot_map: RobotMap) -> dict[int, SubmapPlace]:
 def carry(alignment: Alignment, reference: Change, other: Change) -> Alignment:
     """Return `alignment`, found between the maps as they were then, for the maps as they are now.
 
-    It holds on to the two submaps that it brings nearest to each other; where one of these has left
-    its component, what was accepted is ambiguous until the maps are compared again.
+    It holds on to the submaps of its places, the first that is left, and where none are told, to
+    the two submaps that it brings nearest to each other; where all of these have left their
+    component, what was accepted is ambiguous until the maps are compared again.
     """
     ours = _then(reference, alignment.reference)
     theirs = _then(other, alignment.other)
     if not ours or not theirs:
         return alignment
+    if alignment.places:
+        return _carried_at_places(alignment, ours, theirs)
+    return _carried_at_nearest(alignment, list(ours.values()), list(theirs.values()))
+
+
+def _carried_at_places(alignment: Alignment, ours: Known, theirs: Known) -> Alignment:
+    """Return `alignment` as its places have it now: those of submaps that are where they were."""
+    held = []
+    for place in alignment.places:
+        one, other = ours.get(place.reference), theirs.get(place.other)
+        if one and other and not (_has_left(*one) or _has_left(*other)):
+            at = se2.transform_points(_motion(*one), place.at)
+            held.append((one, other, replace(place, reference=one[1].id, other=other[1].id, at=at)))
+    if not held:
+        return _opened(alignment)
+    moved = alignment.transform
+    one, other, first = held[0]
+    if _motion(*one).any() or _motion(*other).any():
+        there = se2.compose(one[1].pose, first.transform)
+        moved = se2.compose(there, se2.inverse(other[1].pose))
+    return replace(alignment, transform=moved, places=tuple(place for _, _, place in held))
+
+
+def _carried_at_nearest(
+    alignment: Alignment, ours: Sequence[ThenAndNow], theirs: Sequence[ThenAndNow]
+) -> Alignment:
     here = np.array([_middle_then(*each) for each in ours])
     there = np.array([_middle_then(*each) for each in theirs])
     there = se2.transform_points(alignment.transform, there)
     apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
-    i, j = np.unravel_index(np.argmin(apart), apart.shape)
+    i, j = (int(k) for k in np.unravel_index(int(apart.argmin()), apart.shape))
     if _has_left(*ours[i]) or _has_left(*theirs[j]):
         return _opened(alignment)
     first, second = _motion(*ours[i]), _motion(*theirs[j])
@@ -74,15 +104,15 @@ def _opened(alignment: Alignment) -> Alignment:
     return replace(alignment, decision="ambiguous", cause=Reason(ReasonKind.REBASED))
 
 
-def _then(change: Change, component: str) -> list[tuple[SubmapPlace, Submap]]:
-    """Return where submaps were in this component then, and what they are now."""
+def _then(change: Change, component: str) -> Known:
+    """Return where submaps were in this component then, and what they are now, by their id then."""
     _, number = parse_component(component)
     now = {s.id if _span(s)[0] is None else ("scan", _span(s)[0]): s for s in change.now.submaps}
-    found = []
+    found: Known = {}
     for identity, place in change.then.items():
         submap = now.get(identity if place.first is None else ("scan", place.first))
         if submap is not None and place.component == number:
-            found.append((place, submap))
+            found[identity] = place, submap
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mapweave.evidence import Evidence, RunnerUp
-from mapweave.maps import Alignment, Decision, RobotMap, parse_component
+from mapweave.maps import Alignment, Decision, RobotMap, SharedPlace, parse_component
 from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.model import (
@@ -23,6 +23,7 @@ from mapweave_protocol.wire.model import (
     Probability,
     Sentence,
     Transform,
+    WholeStep,
     WireModel,
     to_transform,
 )
@@ -33,6 +34,9 @@ OF_REASONS = (
     "common", "contradicted", "distance", "turn", "rival_common", "rival_contradicted", "outside",
     "confidence", "min_wall", "parts", "spread", "reach", "tolerance",
 )  # fmt: skip
+MAX_PLACES = 16
+STEPS = np.array([1e3, 1e3, 1e4])  # a metre, a metre, a radian, as they travel
+CENTIMETRES = 100
 
 
 class MapVersion(WireModel):
@@ -104,6 +108,37 @@ class WireReason(WireModel):
         return Reason(self.kind, dict(self.numbers), found, self.text)
 
 
+class WirePlace(WireModel):
+    """A place where an alignment holds: two submaps by their ids, and how they lie, in integers.
+
+    Attributes
+    ----------
+    step
+        Of the other in the frame of the reference's [mm, mm, 0.1 mrad].
+    at
+        In the frame of the alignment's reference [cm].
+    """
+
+    reference: Count
+    other: Count
+    step: tuple[WholeStep, WholeStep, WholeStep]
+    at: tuple[WholeStep, WholeStep]
+
+    @classmethod
+    def pack(cls, place: SharedPlace) -> Self:
+        """Return `place` for the wire."""
+        x, y, turn = np.round(place.transform * STEPS).astype(int).tolist()
+        east, north = np.round(place.at * CENTIMETRES).astype(int).tolist()
+        return cls(
+            reference=place.reference, other=place.other, step=(x, y, turn), at=(east, north)
+        )
+
+    def unpack(self) -> SharedPlace:
+        """Return the place."""
+        step, at = np.array(self.step) / STEPS, np.array(self.at) / CENTIMETRES
+        return SharedPlace(self.reference, self.other, step, at)
+
+
 class WireAlignment(WireModel):
     """An alignment of two components."""
 
@@ -122,6 +157,7 @@ class WireAlignment(WireModel):
         default=(), max_length=MAX_ALIGNMENTS
     )
     revoked_in: Count | None = None
+    places: tuple[WirePlace, ...] = Field(default=(), max_length=MAX_PLACES)
 
     @classmethod
     def pack(cls, alignment: Alignment) -> Self:
@@ -139,6 +175,7 @@ class WireAlignment(WireModel):
             set_aside_by=() if status is None else status.set_aside_by,
             revoked_in=None if status is None else status.revoked_in,
             cause=WireReason.pack(alignment.cause),
+            places=tuple(WirePlace.pack(place) for place in alignment.places[:MAX_PLACES]),
         )
 
     @model_validator(mode="after")
@@ -158,6 +195,7 @@ class WireAlignment(WireModel):
             evidence=Evidence.of(self.evidence),
             runner_up=None if self.runner_up is None else self.runner_up.unpack(),
             status=self._status(),
+            places=tuple(place.unpack() for place in self.places),
         )
 
     def _status(self) -> Status | None:

@@ -35,6 +35,7 @@ ComponentName = Annotated[str, Field(pattern=RUN_PATTERN[:-1] + "/(0|[1-9][0-9]{
 Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, allow_inf_nan=False)]
 Metres = Annotated[float, Field(ge=-WORLD_REACH, le=WORLD_REACH, allow_inf_nan=False)]
 JointMetres = Annotated[float, Field(ge=-JOINT_REACH, le=JOINT_REACH, allow_inf_nan=False)]
+WholeStep = Annotated[int, Field(ge=-(10**8), le=10**8)]  # [mm], as WORLD_REACH
 Transform = tuple[Metres, Metres, Angle]
 JointTransform = tuple[JointMetres, JointMetres, Angle]
 

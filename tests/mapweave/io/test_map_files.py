@@ -82,6 +82,8 @@ JUDGED: dict[str, Any] = {
         "turn": 0.5,
         "found": {"kind": "convincing", "common": 30.5, "contradicted": 0.25},
     },
+    "anchors": [[0, 7, 0.25, -1.5, 3.1], [2, 4, 0, 0, 0]],
+    "at": [[3.5, 4.25], [-10, 2]],
 }
 TYPED = {
     **JOINT,
@@ -257,6 +259,8 @@ def test_a_file_from_before_causes_were_typed_keeps_its_sentence(tmp_path: Path)
         "set_aside_by": [],
         "revoked_in": None,
         "cause": {"kind": "words", "text": "30 m of wall in common"},
+        "anchors": [],
+        "at": [],
     }
 
 

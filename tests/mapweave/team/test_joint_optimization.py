@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
+from mapweave.evidence import Evidence
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.loop_closing import LoopCloser
-from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.maps import Alignment, LineMap, RobotMap, SharedPlace, Submap, Trajectory
 from mapweave.reasons import Reason
 from mapweave.team.alignment_graph import Cluster
-from mapweave.team.joint_map import fuse
+from mapweave.team.joint_map import build_joint_map, fuse
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
 from tests.mapweave.buildings import corridor, part, random_pose
 
@@ -118,6 +119,41 @@ def test_a_submap_that_grows_still_goes_along_with_the_one_before(frames: FloatA
     others = {name: robot[:-1] for name, robot in robots.items()}
     woven, rest = WHOLE.weave(cluster, others, alignments)
     assert apart(woven, bent(others, rest)).max() < 0.1 < apart(alone, lines).max() < 0.2
+
+
+@pytest.mark.parametrize(
+    ("bend", "told", "count"), [(0.012, True, 1), (0.012, False, 2), (0.03, True, 2)]
+)
+def test_what_maps_are_bent_by_beyond_the_place_told_does_not_part_them(
+    frames: FloatArray, bend: float, *, told: bool, count: int
+) -> None:
+    """They are 2.5 m apart at the ends, or 6 m: that is more than tracking errs by."""
+    _, robots, [alignment] = team(bend, frames)
+    at = se2.transform_points(robots["a/0"][4].pose, np.array([3.0, 1.0]))
+    held = replace(
+        alignment,
+        evidence=Evidence(reach=20.0),
+        places=(SharedPlace(4, 4, np.zeros(3), at),) if told else (),
+    )
+    joint = build_joint_map({name: rigid(robot) for name, robot in robots.items()}, [held], 1)
+    assert len(joint.components) == count
+
+
+def test_maps_without_walls_come_to_lie_on_each_other_at_the_places_told(
+    frames: FloatArray,
+) -> None:
+    """Nothing is found by comparing submaps here: what is told of places is all there is."""
+    cluster, robots, [alignment] = team(BENT, frames)
+    bare = {
+        name: [replace(s, map=LineMap.empty()) for s in robot] for name, robot in robots.items()
+    }
+    places = tuple(SharedPlace(k, k, np.zeros(3), np.zeros(2)) for k in (4, 1, 8))
+    told = replace(alignment, places=places)
+    for told_of, most in ((told, 0.2), (alignment, 2.0)):
+        woven, poses = WHOLE.weave(cluster, bare, [told_of])
+        here, there = (se2.compose(woven.poses[n], poses[n]) for n in ("a/0", "b/0"))
+        off = np.hypot(*(here - there)[[1, 4, 8], :2].T)
+        assert (off.max() < most) and (most < 1 or off.max() > 0.5)
 
 
 def test_what_was_compared_once_is_not_compared_again(

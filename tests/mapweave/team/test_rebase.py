@@ -7,7 +7,7 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.maps import Alignment, LineMap, RobotMap, SharedPlace, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
 from mapweave.team.rebase import Change, carry, places_of
 from tests.mapweave.buildings import line_map, random_pose, rectangle, walls_of
@@ -62,6 +62,43 @@ def test_what_was_in_common_stays_in_common_whichever_map_is_corrected() -> None
         after = relation(moved.transform, ours.submaps[1], theirs.submaps[1])
         np.testing.assert_allclose(after, before, atol=1e-9)
         assert not np.allclose(moved.transform, FOUND)
+
+
+def placed(reference: int, other: int) -> Alignment:
+    """Return the alignment as it is told at a place: where these submaps lie to each other."""
+    step = relation(FOUND, A.submaps[reference], B.submaps[other])
+    at = se2.transform_points(A.submaps[reference].pose, np.array([1.0, 2.0]))
+    return replace(alignment(FOUND), places=(SharedPlace(reference, other, step, at),))
+
+
+def test_what_tells_its_place_stays_there_whatever_lies_nearer() -> None:
+    """The second submaps lie on each other, but the first ones are where it was found."""
+    ours = corrected(A, 0)
+    moved = carry(placed(0, 0), Change(places_of(A), ours), still(B))
+    [place] = moved.places
+    np.testing.assert_allclose(
+        relation(moved.transform, ours.submaps[0], B.submaps[0]), place.transform, atol=1e-9
+    )
+    here = se2.transform_points(se2.inverse(ours.submaps[0].pose), place.at)
+    np.testing.assert_allclose(here, [1.0, 2.0], atol=1e-9)
+    elsewhere = carry(placed(0, 0), Change(places_of(A), corrected(A, 1)), still(B))
+    np.testing.assert_array_equal(elsewhere.transform, FOUND)
+
+
+def test_of_places_those_are_kept_whose_submaps_stay() -> None:
+    both = replace(alignment(FOUND), places=placed(1, 1).places + placed(0, 0).places)
+    left = replace(A.submaps[1], component=3)
+    gone = replace(A, submaps=(corrected(A, 0).submaps[0], left))
+    kept = carry(both, Change(places_of(A), gone), still(B))
+    assert kept.decision == "accepted"
+    [place] = kept.places
+    assert (place.reference, place.other) == (0, 0)
+    np.testing.assert_allclose(
+        relation(kept.transform, gone.submaps[0], B.submaps[0]), place.transform, atol=1e-9
+    )
+    opened = carry(placed(1, 1), Change(places_of(A), gone), still(B))
+    assert opened.decision == "ambiguous"
+    assert opened.cause.kind is ReasonKind.REBASED
 
 
 def test_a_correction_elsewhere_changes_nothing() -> None:
