@@ -22,6 +22,7 @@ from mapweave.mapping.placement import Placement
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.deskewing import Deskewer
+from mapweave.mapping.tracking.loss import Loss
 from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
 from mapweave.mapping.tracking.pose_covariance import (
     EXACT,
@@ -122,6 +123,7 @@ class Mapper:
         # Raw scans so far, as long as no submap is finished.
         self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._tracker = Tracker(self.parameters.tracker)
+        self._loss = Loss(self.parameters.patience)
         self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
@@ -235,11 +237,12 @@ class Mapper:
         seen = self.seen = observe(straight, self.parameters.observation)
         self._waiting.append(seen)
         placed = lost = False
-        for _ in range(AT_ONCE):
-            if self._waiting:
-                is_last = self._waiting[0] is seen
-                found, was_lost = self._take_first()
-                placed, lost = placed or (found and is_last), lost or was_lost
+        left = AT_ONCE
+        while self._waiting and left > 0:
+            is_last = self._waiting[0] is seen
+            found, was_lost = self._take_first()
+            placed, lost = placed or (found and is_last), lost or was_lost
+            left -= 1 if found else 2  # which is looked for among those missed as well
         return placed, lost
 
     def _take_first(self) -> tuple[bool, bool]:
@@ -248,7 +251,8 @@ class Mapper:
         placed = self._place(seen)
         if placed:
             self._deskewer.placed(seen.scan.stamp, self._tracker.pose)
-        if len(self._tracker.missed) < self._patience(seen):
+        self._loss.note(seen, self._tracker, placed=placed)
+        if not self._loss.is_certain(len(self._tracker.missed), self._patience(seen)):
             return placed, False
         self._start_again()
         return False, True
@@ -274,6 +278,7 @@ class Mapper:
         self._early.clear()
         self._waiting.clear()
         self._tracker = Tracker(self.parameters.tracker)
+        self._loss = Loss(self.parameters.patience)
         self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin = self._frame = se2.IDENTITY
@@ -330,6 +335,7 @@ class Mapper:
             self._component = self._newest_component = self._spare() + (self._unsettled is not None)
         self._follows = False
         self._tracker = self._tracker.afresh()
+        self._loss = Loss(self.parameters.patience)
         self._deskewer = Deskewer()
         self._origin = self._frame = se2.IDENTITY
 
