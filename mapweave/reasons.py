@@ -29,6 +29,7 @@ class ReasonKind(StrEnum):
     PARTS_AGREE = "parts_agree"  # these say more about what was found
     BENT = "bent"  # the place is right, the maps as wholes may not be
     MET_BEFORE = "met_before"
+    MIRRORED = "mirrored"  # they would fit if one were mirrored
 
     REBASED = "rebased"  # what was compared is in another component by now
 
@@ -59,6 +60,7 @@ _NUMBERS: dict[ReasonKind, tuple[str, ...]] = {
     ReasonKind.CONVINCING: _MATCH,
     ReasonKind.PARTS_AGREE: ("parts", "spread"),
     ReasonKind.BENT: ("reach", "tolerance", "confidence"),
+    ReasonKind.MIRRORED: _MATCH,
     ReasonKind.OTHERS_CONTRADICT: ("distance", "turn"),
     ReasonKind.MAPS_CONTRADICT: _MATCH,
     ReasonKind.MAPS_CONTRADICT_JOINTLY: _MATCH,
@@ -68,6 +70,7 @@ _ABOUT_FOUND = {
     ReasonKind.PARTS_AGREE,
     ReasonKind.BENT,
     ReasonKind.MET_BEFORE,
+    ReasonKind.MIRRORED,
     ReasonKind.OTHERS_CONTRADICT,
     ReasonKind.MAPS_CONTRADICT,
     ReasonKind.MAPS_CONTRADICT_JOINTLY,

@@ -16,9 +16,10 @@ from pydantic import Field
 
 from mapweave.config import Config
 from mapweave.fusion.component import Component
-from mapweave.fusion.confidence import ConfidenceParameters, confidence
+from mapweave.fusion.confidence import ConfidenceParameters, confidence, may_be
 from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
+from mapweave.fusion.mirrored import mirrored, told_if_mirrored
 from mapweave.fusion.places import PlaceParameters, compare_at_places, located
 from mapweave.fusion.rooms import RoomParameters, outside
 from mapweave.geometry import se2
@@ -37,7 +38,6 @@ from mapweave.matching.hypotheses import (
 )
 from mapweave.matching.icp import IcpParameters, Target, align_all
 from mapweave.matching.verification import (
-    Verdict,
     VerificationParameters,
     shared_complexity,
     verify,
@@ -75,6 +75,9 @@ class FusionParameters(StageParameters):
     )
     decision: DecisionParameters = derived(DecisionParameters.of)
     reach: ExtrapolationParameters = ExtrapolationParameters()
+    mirrored_wall: float = Field(
+        30.0, gt=0, description="[m] in common of mirrored maps, from which they are told of"
+    )
     min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
 
 
@@ -118,7 +121,10 @@ def align(
         [Component(m, c, lambda lines: prepare(lines, p)) for c in m.components]
         for m in (reference, other)
     )
-    return [_align(a, b, p) for a, b in itertools.product(ours, theirs)]
+    pairs = list(itertools.product(ours, theirs))
+    found = [_align(a, b, p) for a, b in pairs]
+    sizes = [min(a.size, b.size) for a, b in pairs]
+    return told_if_mirrored(found, sizes, p.mirrored_wall, lambda k: _mirrored(*pairs[k], p))
 
 
 def _parameters(parameters: FusionParameters | None, config: Config | None) -> FusionParameters:
@@ -152,6 +158,14 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
         lambda a, b: compare(first.name, a.shape, second.name, b.shape, p),
     )
     return _at_place(found or whole, ours.shape, theirs.shape, p)
+
+
+def _mirrored(first: Component, second: Component, p: FusionParameters) -> Alignment | None:
+    """Compare two components, the second one mirrored, by parallel walls alone."""
+    if first.whole is None or second.whole is None:
+        return None
+    turned = PreparedMap.of(mirrored(second.whole.shape.lines), p.hypotheses, p.raster)
+    return _by_walls(first.name, first.whole.shape, second.name, turned, p)[0]
 
 
 def _is_rigid(whole: Alignment, a: PreparedMap, b: PreparedMap, p: FusionParameters) -> bool:
@@ -213,17 +227,19 @@ def compare(
     if first is None or second is None:
         poor = ReasonKind.SMALL_REFERENCE if first is None else ReasonKind.SMALL_OTHER
         return _no_alignment(a, b, Reason(poor, {"min_wall": p.min_wall}))
-    found = _by_walls(a, first, b, second, p) if possible is None else None
-    if isinstance(found, Alignment):
-        return found
-    ranked = find_alignments(first, second, p, possible if found is None else found)
+    if possible is None:
+        found, shifted = _by_walls(a, first, b, second, p)
+        if found is not None:
+            return found
+        possible = propose_all(first, second, shifted, p.hypotheses)
+    ranked = find_alignments(first, second, p, possible)
     return _decided(a, first, b, second, ranked, p)
 
 
 def _by_walls(
     a: str, first: PreparedMap, b: str, second: PreparedMap, p: FusionParameters
-) -> Alignment | FloatArray:
-    """Return the alignment that parallel walls alone prove; else all that is proposed (n, 3).
+) -> tuple[Alignment | None, FloatArray]:
+    """Return the alignment that parallel walls alone prove, if any; what they propose (n, 3).
 
     It is convincing as it stands, its rivals among what was proposed: shapes need not be looked
     for. Where cells tell already that it will not be, it is not tried.
@@ -231,21 +247,11 @@ def _by_walls(
     shifted, scores = propose_by_walls(first, second, p.hypotheses, p.verification)
     middle = second.raster.oriented.points.mean(axis=0)
     leaders = different(shifted, scores, middle, p.hypotheses)
-    if _may_convince(scores[leaders[:2]].tolist(), p):
-        ranked = find_alignments(first, second, p, shifted)
-        found = _decided(a, first, b, second, ranked, p)
-        if found.decision == "accepted":
-            return found
-    return propose_all(first, second, shifted, p.hypotheses)
-
-
-def _may_convince(scores: Sequence[float], p: FusionParameters) -> bool:
-    """Tell whether the first of `scores` [m] would do, were it held evenly, with such a rival."""
-    weight = p.verification.contradiction_weight
-    best, rival = (
-        Verdict(score, 0.0, 1.0, 0.0, score / 2, weight) for score in (*scores, 0.0, 0.0)[:2]
-    )
-    return confidence(best, rival, p.confidence) >= p.decision.min_confidence
+    weight, least = p.verification.contradiction_weight, p.decision.min_confidence
+    if may_be(scores[leaders[:2]].tolist(), weight, p.confidence) < least:
+        return None, shifted
+    found = _decided(a, first, b, second, find_alignments(first, second, p, shifted), p)
+    return found if found.decision == "accepted" else None, shifted
 
 
 def _decided(

@@ -49,6 +49,11 @@ class Component:
         """All of it; None where there is too little wall to compare."""
         return self._window(tuple(range(len(self.submaps))))
 
+    @property
+    def size(self) -> float:
+        """[m] of wall; 0 where it is too little to compare."""
+        return 0.0 if self.whole is None else float(self.whole.shape.raster.weight.sum())
+
     @cached_property
     def middles(self) -> FloatArray:
         """(n, 2) of the walls of its submaps [m]; infinitely far where there are none."""

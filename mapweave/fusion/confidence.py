@@ -7,6 +7,8 @@ two: in a building that half a turn maps onto itself, each is right half of the 
 be bent by elsewhere is a matter of their reach (`reach`).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -58,6 +60,22 @@ def confidence(best: Verdict, rival: Verdict | None, parameters: ConfidenceParam
     slopes = np.array([p.score, p.held, p.overlap, p.lead])
     either = 1 / (1 + np.exp(-(p.intercept + slopes @ features(best, rival))))
     return float(either * share(best, rival, p))
+
+
+def may_be(scores: Sequence[float], weight: float, parameters: ConfidenceParameters) -> float:
+    """Return the confidence that the first of `scores` [m] would have, were it held evenly.
+
+    Its rival is the second, if there are two.
+
+    Parameters
+    ----------
+    weight
+        Metres in common that a metre contradicted outweighs.
+    """
+    best, rival = (
+        Verdict(score, 0.0, 1.0, 0.0, score / 2, weight) for score in (*scores, 0.0, 0.0)[:2]
+    )
+    return confidence(best, rival, parameters)
 
 
 def _rivalry(best: Verdict, rival: Verdict | None) -> float:
