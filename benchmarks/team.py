@@ -118,8 +118,8 @@ def run(options: argparse.Namespace) -> None:
                 print(f"  {alignment.reference} - {alignment.other}: {alignment.reason}")
     print(format_table(HEAD, rows))
     print(
-        f"injected: {options.agreeing} false at once, that agree, of a component that more ways than"
-        " these join to each other without them; held: all set aside, named, poses as without them;"
+        f"injected: {options.agreeing} false at once, that agree, where more ways than these join"
+        " the ends of each without them; held: all set aside, named, poses as without them;"
         " undecided: others"
     )
 
