@@ -1,4 +1,4 @@
-"""Teams: all stretches of a log joined at once, and again with one false alignment among them."""
+"""Teams: all stretches of a log joined at once, and again with false alignments among them."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -39,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--logs", nargs="+", metavar="NAME", help="which logs (default all)")
     parser.add_argument("--robots", type=int, default=8, metavar="N", help="stretches a log (8)")
     parser.add_argument("--trials", type=int, default=20, metavar="N", help="injections (20)")
+    parser.add_argument(
+        "--agreeing", type=int, default=1, metavar="N", help="injected at once that agree (1)"
+    )
     parser.add_argument("--seed", type=int, default=1, help="draws what is injected (1)")
 
 
@@ -115,8 +118,9 @@ def run(options: argparse.Namespace) -> None:
                 print(f"  {alignment.reference} - {alignment.other}: {alignment.reason}")
     print(format_table(HEAD, rows))
     print(
-        "injected: false alignments between components that two ways join without it; held: set"
-        " aside, named, poses as without it; undecided: others, between which one way or none is"
+        f"injected: {options.agreeing} false at once, that agree, where more ways than these join"
+        " the ends of each without them; held: all set aside, named, poses as without them;"
+        " undecided: others"
     )
 
 
@@ -136,27 +140,33 @@ def _tell_trials(team: Team, options: argparse.Namespace) -> list[str]:
     (cluster, *_), judged = team.join(team.alignments)
     held, decidable = 0, 0
     for _ in range(options.trials):
-        false = _false_alignment(team, sorted(cluster.poses), rng)
-        if is_held_twice(cluster, judged, false):
+        false = false_alignments(team, sorted(cluster.poses), rng, options.agreeing)
+        if all(is_held(cluster, judged, each, len(false) + 1) for each in false):
             decidable += 1
             held += _holds(team, cluster, false)
     return [str(decidable), str(held), str(options.trials - decidable)]
 
 
-def _false_alignment(team: Team, names: Sequence[str], rng: Generator) -> Alignment:
-    """Return a wrong alignment of two components that lie somewhere near each other."""
-    a, b = (names[k] for k in rng.choice(len(names), 2, replace=False))
+def false_alignments(
+    team: Team, names: Sequence[str], rng: Generator, count: int
+) -> list[Alignment]:
+    """Return wrong alignments of one component to `count` others, which all lay it down alike."""
+    b, *others = (names[k] for k in rng.choice(len(names), count + 1, replace=False))
     angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(LEAST_ERROR, 10.0)
     turn = rng.choice([0.0, np.pi / 2, np.pi])
     off = np.array([distance * np.cos(angle), distance * np.sin(angle), turn])
     middle = np.array([*team.ends[b].mean(axis=0), 0.0])
-    there = se2.compose(se2.between(team.frames[a], team.frames[b]), middle)
-    transform = se2.compose(se2.compose(there, off), se2.inverse(middle))
-    return Alignment(a, b, transform, "accepted", FALSE_CONFIDENCE, Reason.words("injected"))
+    moved = se2.compose(se2.compose(team.frames[b], middle), off)
+    frame = se2.compose(moved, se2.inverse(middle))
+    cause = Reason.words("injected")
+    return [
+        Alignment(a, b, se2.between(team.frames[a], frame), "accepted", FALSE_CONFIDENCE, cause)
+        for a in others
+    ]
 
 
-def is_held_twice(cluster: Cluster, judged: Sequence[Alignment], false: Alignment) -> bool:
-    """Tell whether two ways without a common alignment join the ends of `false` already."""
+def is_held(cluster: Cluster, judged: Sequence[Alignment], false: Alignment, ways: int) -> bool:
+    """Tell whether so many ways without a common alignment join the ends of `false` already."""
     number = {name: k for k, name in enumerate(cluster.poses)}
     edges = [
         Edge(number[a.reference], number[a.other], a.transform, a.confidence)
@@ -165,12 +175,12 @@ def is_held_twice(cluster: Cluster, judged: Sequence[Alignment], false: Alignmen
     ]
     each = dict.fromkeys(range(len(edges)), 1.0)
     ends = number[false.reference], number[false.other]
-    return weakest_cut(range(len(number)), edges, each, *ends).strength >= 2
+    return weakest_cut(range(len(number)), edges, each, *ends).strength >= ways
 
 
-def _holds(team: Team, cluster: Cluster, false: Alignment) -> bool:
-    (there, *_), judged = team.join([*team.alignments, false])
-    return _is_set_aside(judged[-1]) and all(
+def _holds(team: Team, cluster: Cluster, false: Sequence[Alignment]) -> bool:
+    (there, *_), judged = team.join([*team.alignments, *false])
+    return all(map(_is_set_aside, judged[-len(false) :])) and all(
         name in there.poses and np.allclose(there.poses[name], pose, atol=SAME_POSE)
         for name, pose in cluster.poses.items()
     )

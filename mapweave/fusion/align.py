@@ -270,7 +270,14 @@ def _decided(
     beyond = outside(first.raster, second.raster, best.transform, p.verification, p.rooms)
     one_room = beyond < p.rooms.min_outside
     sure *= p.rooms.unique if one_room else 1.0
-    decision, cause = decide(best, rival, sure, p.decision, beyond if one_room else None)
+    decision, cause = decide(
+        best,
+        rival,
+        sure,
+        p.decision,
+        beyond if one_room else None,
+        rival_is_room=not one_room and _is_room(first, second, best, rival, p),
+    )
     return Alignment(
         a,
         b,
@@ -281,6 +288,20 @@ def _decided(
         evidence(best),
         None if rival is None else runner_up(best, rival),
     )
+
+
+def _is_room(
+    first: PreparedMap,
+    second: PreparedMap,
+    best: Hypothesis,
+    rival: Hypothesis | None,
+    p: FusionParameters,
+) -> bool:
+    """Whether a rival that is near lays one room on another, and nothing else."""
+    if rival is None or rival.verdict.score <= p.decision.max_rival * best.verdict.score:
+        return False
+    told = outside(first.raster, second.raster, rival.transform, p.verification, p.rooms)
+    return told < p.rooms.min_outside
 
 
 def find_alignments(

@@ -14,7 +14,12 @@ from mapweave.fusion.extrapolation import ExtrapolationParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.matching.distance_field import DistanceField
-from mapweave.matching.verification import VerificationParameters, contradicting, worth_of_missing
+from mapweave.matching.verification import (
+    VerificationParameters,
+    coinciding,
+    contradicting,
+    worth_of_missing,
+)
 
 LIKELY = 1.64  # standard deviations towards the free space, of which 19 of 20 are no more
 
@@ -40,14 +45,37 @@ def contradicted_beyond(
     verification, parameters
         When walls contradict, and what maps are bent by.
     """
+    found = judged_around(reference, other, transform, shared, verification, parameters)
+    return found[1]
+
+
+def judged_around(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    shared: FloatArray,
+    verification: VerificationParameters,
+    parameters: ExtrapolationParameters,
+    within: float = math.inf,
+) -> tuple[float, float]:
+    """Return metres of wall in common and, whatever is bent, contradicted, about some places.
+
+    Parameters
+    ----------
+    shared
+        (n, 2) where the two are known to lie on each other, frame of `other` [m].
+    within
+        [m] from there, to which walls count.
+    """
     if len(shared) == 0:
-        return math.inf
+        return 0.0, math.inf
     there = se2.transform_points(transform, shared)
     ways = (
         (reference, other, transform, shared),
         (other, reference, se2.inverse(transform), there),
     )
-    return sum(_one_way(*way, verification, parameters) for way in ways)
+    found = [_one_way(*way, verification, parameters, within) for way in ways]
+    return min(common for common, _ in found), sum(against for _, against in found)
 
 
 def _one_way(
@@ -57,12 +85,16 @@ def _one_way(
     shared: FloatArray,
     v: VerificationParameters,
     p: ExtrapolationParameters,
-) -> float:
-    """[m] of wall of `other` that `reference` saw through; `shared` (n, 2) in the other's frame."""
+    within: float,
+) -> tuple[float, float]:
+    """[m] of wall of `other` on walls of `reference`, and where that saw through."""
+    on = coinciding(reference, other, transform, v)
     against = contradicting(reference, other, transform, v)
-    points = other.oriented.points[against]
+    points = other.oriented.points
     apart, _ = scipy.spatial.KDTree(shared).query(points)
     _, _, depth = reference.look_up(se2.transform_points(transform, points))
     deep = depth > v.clearance + LIKELY * p.bend * np.minimum(apart, p.most)
-    metres = other.weight * worth_of_missing(other, v)
-    return float(metres[against][deep].sum())
+    near = apart <= within
+    missing = other.weight * worth_of_missing(other, v)
+    common, gone = other.weight[on & near].sum(), missing[against & deep & near].sum()
+    return float(common), float(gone)

@@ -52,6 +52,13 @@ class DecisionParameters(StageParameters):
     max_rival: float = Field(
         0.5, gt=0, lt=1, description="score of the best different hypothesis, as a share"
     )
+    max_weak_rival: float = Field(
+        0.8,
+        gt=0,
+        lt=1,
+        description="the same of a rival that would itself be contradicted, or that lays one room"
+        " on another alone: rooms are built alike, and what else the best explains, it does not",
+    )
     min_lead: float = Field(
         6.5,
         ge=0,
@@ -90,10 +97,13 @@ def decide(
     sure: float,
     p: DecisionParameters,
     outside: float | None = None,
+    *,
+    rival_is_room: bool = False,
 ) -> tuple[Decision, Reason]:
     """Return the decision and its reason; `sure` is the confidence.
 
-    Where all that is shared lies within one room, `outside` is what little does not [m].
+    Where all that is shared lies within one room, `outside` is what little does not [m];
+    `rival_is_room` tells whether all does that the rival shares.
     """
     v = best.verdict
     match = {"common": v.common, "contradicted": v.contradicted}
@@ -105,7 +115,9 @@ def decide(
         return "ambiguous", Reason(ReasonKind.PARALLEL, match)
     if best.complexity < p.min_complexity and v.held < p.plain_held:
         return "ambiguous", Reason(ReasonKind.STRAIGHT, match)
-    if rival is not None and rival.verdict.score > p.max_rival * v.score:
+    weak = rival is not None and (rival_is_room or rival.verdict.overlap < p.min_overlap)
+    most = p.max_weak_rival if weak else p.max_rival
+    if rival is not None and rival.verdict.score > most * v.score:
         return "ambiguous", Reason(ReasonKind.RIVAL, {**match, **_against(best, rival)})
     # Of a rival that shares next to nothing there is nothing to tell.
     next_best = {} if rival is None or rival.verdict.common < 1 else _against(best, rival)

@@ -127,7 +127,8 @@ class _Graph:
         # What is asked first is whether the places are right; that maps are bent is no objection.
         bent = bend(link.evidence.reach or 0.0, self._parameters.reach)
         transform = se2.between(self._middles[first], there)
-        at = np.array([place.at for place in link.places]).reshape(-1, 2)
+        # The transform is of the first place: at the others the maps may be bent against it.
+        at = np.array([place.at for place in link.places[:1]]).reshape(-1, 2)
         held = se2.transform_points(se2.inverse(self._middles[first]), at)
         return Edge(first, second, transform, _place(link), bent, held, pinned=_is_pinned(link))
 

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from pydantic import Field
 
-from mapweave.fusion.beyond import contradicted_beyond
+from mapweave.fusion.beyond import judged_around
 from mapweave.fusion.extrapolation import ExtrapolationParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, Int32Array
@@ -47,6 +47,9 @@ class ContradictionParameters(StageParameters):
     )
     metres_per_log: float = Field(
         1.5, gt=0, description="[m] contradicted beyond that, that make it e times less probable"
+    )
+    within: float = Field(
+        20.0, gt=0, description="[m] from the places that hold two maps, to which walls are asked"
     )
     step: float = Field(0.1, gt=0, description="[m] poses nearer to each other are judged once")
     turn_step: float = Field(0.01, gt=0, description="[rad] as well")
@@ -152,8 +155,9 @@ class PairVerdicts:
             if len(around) == 0 or self._excess(found) <= 0:
                 return found
             held = se2.transform_points(self._frames[second], around * p.step)
-            left = contradicted_beyond(one, other, pose, held, p.verification, p.bends)
-            return replace(found, contradicted=left)
+            about = one, other, pose, held, p.verification, p.bends, p.within
+            common, contradicted = judged_around(*about)
+            return replace(found, common=common, contradicted=contradicted)
 
         verdict = self._verdicts.get((one, other, x, y, turn, around.tobytes()), judge)
         excess = self._excess(verdict)
