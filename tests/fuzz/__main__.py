@@ -5,11 +5,16 @@ ones. Each target runs in a process of its own; what breaks a rule is kept as a 
 """
 
 import argparse
+import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 from tests.fuzz.targets import targets
+
+ROOT = Path(__file__).parents[2]
+PROTOCOL = ROOT / "protocol"
 
 
 def main() -> int:
@@ -29,8 +34,10 @@ def main() -> int:
 
 def _held(name: str, seconds: int) -> bool:
     """Fuzz one target, say how far it came, return whether its rule held."""
+    reached_by = [str(ROOT), str(PROTOCOL), os.environ.get("PYTHONPATH", "")]
     done = subprocess.run(
         [sys.executable, "-m", "tests.fuzz.one", name, str(seconds)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(reached_by), "MAPWEAVE_PURE": "1"},
         capture_output=True,
         text=True,
         errors="replace",

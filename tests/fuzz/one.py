@@ -9,7 +9,9 @@ PACKAGES = ["mapweave", "mapweave_protocol"]
 LONGEST = 20  # [s] that one input may take
 MOST_MEMORY = 3000  # [MiB]
 
-with atheris.instrument_imports(include=PACKAGES):  # what is imported elsewhere is not watched
+# An editable installation finds modules before Atheris does, which then watches none of them.
+sys.meta_path[:] = [each for each in sys.meta_path if "editable" not in type(each).__module__]
+with atheris.instrument_imports(include=PACKAGES):
     from tests.fuzz.targets import targets
 
 
