@@ -14,8 +14,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from queue import Empty, SimpleQueue
 
 import numpy as np
+import zenoh
 
 from benchmarks.faults.outages import latest_version
 from benchmarks.faults.trial import TrialError, until
@@ -36,7 +38,7 @@ from mapweave_deploy.sim.simulation import scan_line
 from mapweave_deploy.sim.trajectories import TourParameters, plan_tours
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.link.inbox import (
-    Inbox,
+    Arrival,
     joint_reader,
     joint_status_reader,
     map_reader,
@@ -48,6 +50,7 @@ from mapweave_protocol.wire.messages import JointStatusMessage, StatusMessage
 
 TEAM, STORE = "crowd", "store.sqlite"
 SAMPLED = 2.0  # [s] between two looks at the processes
+SKEW = 0.02  # [s] by which the coordinator may hear a map before we do
 MOST_LATE = 2.0  # [s], the 99th percentile, from a map to a version of the joint map with it
 MOST_GROWN = 0.1  # of memory, in the second half of the run; maps grow as long as robots drive
 LEAST_GROWN = 16.0  # [MiB] that are nothing
@@ -60,7 +63,7 @@ class Heard:
     Attributes
     ----------
     inbox
-        What has arrived.
+        What has arrived, and when [s since 1970].
     maps
         By robot, the versions of its map and when each came [s since 1970].
     versions
@@ -69,19 +72,26 @@ class Heard:
         What each has said last.
     """
 
-    inbox: Inbox = field(default_factory=lambda: Inbox(capacity=100_000))
+    inbox: SimpleQueue[tuple[Arrival, float]] = field(default_factory=SimpleQueue)
     maps: dict[str, dict[int, float]] = field(default_factory=dict)
     versions: dict[int, float] = field(default_factory=dict)
     robots: dict[str, StatusMessage] = field(default_factory=dict)
     coordinator: JointStatusMessage | None = None
+
+    def put(self, sample: zenoh.Sample) -> None:
+        """Take in what comes; when it came is noted before anything is made of it."""
+        gone = sample.kind == zenoh.SampleKind.DELETE
+        arrival = Arrival(str(sample.key_expr), sample.payload.to_bytes(), gone)
+        self.inbox.put((arrival, time.time()))
 
     def hear(self, over: threading.Event) -> None:
         """Take in what comes until it is over."""
         maps, joints = map_reader(), joint_reader()
         statuses, coordinators = status_reader(), joint_status_reader()
         while not over.is_set():
-            arrival, now = self.inbox.get(0.1), time.time()
-            if arrival is None:
+            try:
+                arrival, now = self.inbox.get(timeout=0.1)
+            except Empty:
                 continue
             if maps.reads(arrival) and (one := maps.read(arrival)) is not None:
                 self.maps.setdefault(one.robot, {}).setdefault(one.version, now)
@@ -119,7 +129,7 @@ def delays(heard: Heard, begun: Sequence[float]) -> list[float]:
     """
     found = []
     for came in (at for versions in heard.maps.values() for at in versions.values()):
-        version = bisect_left(begun, came) + 1
+        version = bisect_left(begun, came - SKEW) + 1
         if version in heard.versions:
             found.append(heard.versions[version] - came)
     return found
@@ -147,7 +157,7 @@ def drive(folder: Path, robots: int, seconds: float) -> list[Member]:
 def _hearing(plan: Plan) -> Iterator[Heard]:
     heard, over = Heard(), threading.Event()
     thread = threading.Thread(target=heard.hear, args=(over,))
-    put, team = heard.inbox.put, plan.team
+    put, team = heard.put, plan.team
     with (
         open_session([plan.listen], patience=60.0) as session,
         declare_subscriber(session, MAP.pattern(team=team), put, history=64),

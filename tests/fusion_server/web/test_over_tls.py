@@ -283,10 +283,10 @@ def test_a_coordinator_over_tls_serves_its_page_to_the_team(
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as first, socket.create_server(("", 0)) as second:
         wire, port = (each.getsockname()[1] for each in (first, second))
-    router = ["router", "--listen", f"tls/127.0.0.1:{wire}", "--tls", team_keys / "router"]
+    router = ["router", "--listen", f"tls/127.0.0.1:{wire}", "--tls", str(team_keys / "router")]
     server = ["server", "--team", "rescue", "--connect", f"tls/127.0.0.1:{wire}"]
     server += ["--store", str(tmp_path / "store.sqlite"), "--http", f"0.0.0.0:{port}"]
-    with _running(router, [*server, "--tls", team_keys / "coordinator"]) as (_, said):
+    with _running(router, [*server, "--tls", str(team_keys / "coordinator")]) as (_, said):
         told = next(line for line in said if "live page: " in line)
         assert told.split("live page: ")[1].strip() == f"https://127.0.0.1:{port}/"
         assert any("coordinating team rescue" in line for line in said)
