@@ -86,6 +86,12 @@ bench: $(KERNELS)
 bench-wire: $(KERNELS)
 	$(BIN)/python -m benchmarks wire
 
+# A minute for each reader and decoder: SECONDS=600 for longer, TARGETS="bag keys" for some.
+.PHONY: fuzz
+fuzz: $(KERNELS)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'atheris>=3'
+	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),60) $(TARGETS)
+
 .PHONY: docs
 docs: $(KERNELS)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

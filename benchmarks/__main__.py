@@ -27,7 +27,7 @@ from benchmarks import (
     usual_counts,
     wire,
 )
-from benchmarks.faults import hostile, kills, lossy, outages, subscribers
+from benchmarks.faults import crowd, hostile, kills, lossy, outages, subscribers
 from benchmarks.speed import command as speed
 
 
@@ -67,6 +67,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "kills": kills,
     "lossy": lossy,
     "subscribers": subscribers,
+    "crowd": crowd,
     "page": page,
     "mutations": mutations,
 }

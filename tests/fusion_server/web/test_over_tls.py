@@ -8,12 +8,13 @@ import socket
 import ssl
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
+from unittest.mock import Mock
 
 import pytest
 from playwright.sync_api import expect
@@ -257,37 +258,39 @@ def test_without_keys_a_coordinator_is_not_served_to_others(
     assert not store.exists()
 
 
+@contextmanager
+def _running(*commands: Sequence[str | Path]) -> Iterator[list[IO[str]]]:
+    """Run commands of mapweave, and give what each says; all end well in the end."""
+    program = Path(sys.executable).with_name("mapweave")
+    with ExitStack() as stack:
+        processes = [
+            stack.enter_context(
+                subprocess.Popen([program, *words], stderr=subprocess.PIPE, text=True)
+            )
+            for words in commands
+        ]
+        try:
+            yield [process.stderr for process in processes if process.stderr is not None]
+        finally:
+            for process in processes:
+                process.terminate()
+                process.communicate(timeout=PATIENCE)
+        assert [process.returncode for process in processes] == [0] * len(processes)
+
+
 def test_a_coordinator_over_tls_serves_its_page_to_the_team(
     team_keys: Path, tmp_path: Path
 ) -> None:
-    """A router, a coordinator: processes, as on two machines."""
     with socket.create_server(("127.0.0.1", 0)) as first, socket.create_server(("", 0)) as second:
         wire, port = (each.getsockname()[1] for each in (first, second))
-    endpoint, program = f"tls/127.0.0.1:{wire}", Path(sys.executable).with_name("mapweave")
-    coordinator = [
-        *("--team", "rescue", "--connect", endpoint, "--tls", team_keys / "coordinator"),
-        *("--store", tmp_path / "store.sqlite", "--http", f"0.0.0.0:{port}"),
-    ]
-    processes = [
-        subprocess.Popen([program, *map(str, words)], stderr=subprocess.PIPE, text=True)
-        for words in (
-            ["router", "--listen", endpoint, "--tls", team_keys / "router"],
-            ["server", *coordinator],
-        )
-    ]
-    try:
-        assert processes[1].stderr is not None
-        told = next(line for line in processes[1].stderr if "live page: " in line)
+    router = ["router", "--listen", f"tls/127.0.0.1:{wire}", "--tls", str(team_keys / "router")]
+    server = ["server", "--team", "rescue", "--connect", f"tls/127.0.0.1:{wire}"]
+    server += ["--store", str(tmp_path / "store.sqlite"), "--http", f"0.0.0.0:{port}"]
+    with _running(router, [*server, "--tls", str(team_keys / "coordinator")]) as (_, said):
+        told = next(line for line in said if "live page: " in line)
         assert told.split("live page: ")[1].strip() == f"https://127.0.0.1:{port}/"
-        assert any("coordinating team rescue" in line for line in processes[1].stderr)
-        page = SecurePage(HttpAddress("127.0.0.1", port), Feed(), None, team_keys)  # type: ignore[arg-type]
+        assert any("coordinating team rescue" in line for line in said)
+        page = SecurePage(HttpAddress("127.0.0.1", port), Feed(), Mock(), team_keys)
         assert page.ask("/healthz", BOB).body == b"alive\n"
         with pytest.raises((ssl.SSLError, ConnectionError)):
             page.ask("/healthz", None)
-    finally:
-        for process in processes:
-            process.terminate()
-            assert process.stderr is not None
-            process.stderr.read()
-            assert process.wait(PATIENCE) == 0
-            process.stderr.close()
