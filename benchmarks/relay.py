@@ -17,12 +17,15 @@ class Relay:
         Where it listens, as Zenoh writes it.
     up, down
         Bytes from who connected, and to it, all that TCP carries.
+    connections
+        How many there were; on a machine with too much to do one may be given up.
     """
 
     def __init__(self, listener: socket.socket, target: tuple[str, int]) -> None:
         self.endpoint = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
         self.up = 0
         self.down = 0
+        self.connections = 0
         self._listener = listener
         self._target = target
         self._open: list[socket.socket] = []
@@ -32,6 +35,7 @@ class Relay:
         with suppress(OSError):
             while True:
                 near, _ = self._listener.accept()
+                self.connections += 1
                 far = socket.create_connection(self._target)
                 self._open += [near, far]
                 threading.Thread(target=self._pass_up, args=(near, far), daemon=True).start()
@@ -44,15 +48,17 @@ class Relay:
             _shut(end)
 
     def _pass_up(self, near: socket.socket, far: socket.socket) -> None:
-        for block in _blocks(near):
-            self.up += len(block)
-            far.sendall(block)
+        with suppress(OSError):  # the other end has gone meanwhile
+            for block in _blocks(near):
+                self.up += len(block)
+                far.sendall(block)
         _shut(far)
 
     def _pass_down(self, far: socket.socket, near: socket.socket) -> None:
-        for block in _blocks(far):
-            self.down += len(block)
-            near.sendall(block)
+        with suppress(OSError):
+            for block in _blocks(far):
+                self.down += len(block)
+                near.sendall(block)
         _shut(near)
 
 

@@ -196,6 +196,8 @@ def _follow(
                 ends.setdefault(status.robot, time.monotonic() + AFTER)
         for robot, end in ends.items():
             if robot not in counted and time.monotonic() >= end:
+                if relays[robot].connections > 1:
+                    print(f"{robot}: {relays[robot].connections} connections: one was given up")
                 counted[robot] = relays[robot].up, relays[robot].down, last[robot]
     return counted
 

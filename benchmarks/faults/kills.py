@@ -11,7 +11,7 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -29,7 +29,9 @@ from mapweave_deploy.run.team_plan import simulated_team
 from mapweave_protocol.link.inbox import Inbox, joint_reader
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.subscriber import joint_maps
+from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import JOINT_MAP
+from mapweave_protocol.wire.messages import JointMapMessage
 
 DISTANCE, ANGLE = 0.1, np.radians(1.0)  # [m], [rad] from where it is in the undisturbed joint map
 PAUSE = 0.5, 4.0  # [s] between two events
@@ -50,7 +52,7 @@ class Heard:
         Versions as a subscriber got them.
     last
         The last one of these.
-    payloads
+    published
         By version, what was published as it.
     since
         When the last one came [s].
@@ -58,7 +60,7 @@ class Heard:
 
     delivered: list[int] = field(default_factory=list)
     last: JointMap | None = None
-    payloads: dict[int, set[bytes]] = field(default_factory=lambda: defaultdict(set))
+    published: dict[int, list[JointMapMessage]] = field(default_factory=lambda: defaultdict(list))
     since: float = field(default_factory=time.monotonic)
 
     def take(self, joint: JointMap) -> None:
@@ -203,16 +205,31 @@ def _hearing(trial: Trial) -> Iterator[Heard]:
             while (arrival := inbox.get(0.0)) is not None:
                 message = reader.read(arrival)
                 if message is not None:
-                    heard.payloads[message.version].add(arrival.payload)
+                    heard.published[message.version].append(message)
 
 
 def _faults(heard: Heard) -> Iterator[str]:
     """Yield what went wrong with versions: lost, out of order, or a number used twice."""
     if heard.delivered != list(range(1, len(heard.delivered) + 1)):
         yield f"versions at a subscriber: {heard.delivered}"
-    for version, payloads in heard.payloads.items():
-        if len(payloads) > 1:
-            yield f"version {version} was used {len(payloads)} times"
+    for version, messages in heard.published.items():
+        used = times_used(messages)
+        if used > 1:
+            yield f"version {version} was used {used} times"
+
+
+def times_used(messages: Sequence[JointMapMessage]) -> int:
+    """Return for how many versions one number was used, of all that was published under it.
+
+    After a restart the latest version is published again whole, which was published before as what
+    changed: both say where every robot is.
+    """
+    forms = [{encode(m) for m in messages if m.changes == changed} for changed in (True, False)]
+    placed = {
+        (m.series, repr([(c.robots, c.confidence, c.marks) for c in m.components]))
+        for m in messages
+    }
+    return max(len(placed), *(len(form) for form in forms))
 
 
 def differences(quiet: Result, disturbed: Result) -> Iterator[str]:
@@ -224,9 +241,9 @@ def differences(quiet: Result, disturbed: Result) -> Iterator[str]:
     frames: dict[str, tuple[str, FloatArray]] = {}
     for name, frame, scans in sorted(disturbed.places(), key=lambda each: -len(each[2])):
         common = [scan for scan in scans if scan in truth]
-        seen |= set(common)
-        if not common:
+        if seen.issuperset(common):  # such as the last scan, again, of who had delivered not all
             continue
+        seen |= set(common)
         theirs = truth[common[0]][0]
         poses = np.array([scans[scan] for scan in common])
         true = np.array([truth[scan][1] for scan in common])

@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 import zenoh
 
+import mapweave_protocol
 from mapweave.cli import EXIT_FAILED, EXIT_USAGE, main
 from mapweave.io.readers import read_scans
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
+from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_protocol.link.asking import ask_robot_map
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler, MapSender
 from mapweave_protocol.link.inbox import (
@@ -25,12 +27,14 @@ from mapweave_protocol.link.inbox import (
     status_reader,
 )
 from mapweave_protocol.link.session import declare_map_publisher, declare_subscriber, open_session
+from mapweave_protocol.link.status_schedule import AGAIN
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.messages import AlignmentMessage, StatusMessage
 from mapweave_protocol.wire.pairs import responsible
 
 MAPWEAVE = Path(sys.executable).with_name("mapweave")
 PATIENCE = 60.0  # [s]
+STATUS = AgentParameters().status_interval
 SCANS = 40
 FIRST = responsible("a", "b")
 SECOND = "b" if FIRST == "a" else "a"
@@ -171,6 +175,18 @@ def test_what_a_robot_says_it_sent_is_what_was_sent(
             sent = listener.statuses["a"].sent["map"]
             listener.until(lambda: len(sizes) == sent.messages)
     assert sum(sizes) == sent.bytes
+
+
+def test_who_asks_is_told_at_once_how_a_robot_is(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    with open_session([endpoint], patience=PATIENCE) as session:
+        listener = Listener(session, team)
+        with agent("a", logs[0], team, endpoint):
+            listener.until(lambda: listener.finished("a"))
+            time.sleep(3 * AGAIN)  # then it has said for some time all that it has to say
+            told = mapweave_protocol.statuses(team, connect=[endpoint], timeout=STATUS / 2)
+            assert next(told).state == "finished"
 
 
 def test_when_the_responsible_robot_is_gone_the_other_one_compares(

@@ -31,7 +31,6 @@ PAUSE = 0.2  # [s] between attempts
 # Also after a long outage the link is back soon after the router can be reached.
 RETRY = {"period_init_ms": 250, "period_max_ms": 500, "period_increase_factor": 2}
 LEASE = 5.0  # [s] after which a robot that fell silent counts as gone
-SIGNS = 3  # of life in a lease; a robot that drives slowly pays for them by the metre
 HEARTBEAT = 0.5  # [s] after which the loss of a publisher's last sample is noticed
 
 # Zenoh would go on trying one that no transport of its own knows.
@@ -116,7 +115,6 @@ def _common_settings(link: LinkSettings) -> dict[str, object]:
     return (link.keys.settings() if link.keys else {}) | {
         "scouting/multicast/enabled": False,
         "transport/link/tx/lease": int(LEASE * 1000),
-        "transport/link/tx/keep_alive": SIGNS,
         "transport/link/rx/max_message_size": 2 * MAX_PAYLOAD,
         # It would leave files in /dev/shm after a kill.
         "transport/shared_memory/enabled": False,

@@ -197,6 +197,26 @@ def test_a_status_arrives_as_it_was_sent() -> None:
     assert decode(JointStatusMessage, encode(joint_status())) == joint_status()
 
 
+def test_what_is_known_by_its_place_travels_without_its_name_and_all_else_with_it() -> None:
+    [travels] = alignments().alignments
+    assert travels.values()[5] == (1.5,)  # the first that evidence has is what is in common
+    strange = travels.model_copy(update={"evidence": {"common": 1.5, "strange": 2.0}})
+    message = alignments().model_copy(update={"alignments": (strange,)})
+    assert decode(AlignmentMessage, encode(message)) == message
+    sent = {"pose": Traffic(messages=1, bytes=2), "map": Traffic(messages=3, bytes=4)}
+    counted = status().model_copy(update={"sent": sent})
+    assert decode(StatusMessage, encode(counted)) == counted
+
+
+@pytest.mark.parametrize("boot", ["00a1ff09", "deadbeef", "12345678"])
+def test_a_run_named_by_eight_digits_takes_less_than_its_name(boot: str) -> None:
+    named = status().model_copy(update={"boot": boot})
+    assert decode(StatusMessage, encode(named)) == named
+    other = named.model_copy(update={"boot": f"{boot[:7]}z"})
+    assert decode(StatusMessage, encode(other)) == other
+    assert len(encode(named)) < len(encode(other))
+
+
 def test_a_segment_costs_few_bytes(random_map: MakeMap) -> None:
     """A list of floats would take 36 bytes of msgpack for each segment alone."""
     robot_map = random_map(7, 40)
