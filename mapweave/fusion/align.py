@@ -12,73 +12,38 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from pydantic import Field
 
 from mapweave.config import Config
 from mapweave.fusion.component import Component
-from mapweave.fusion.confidence import ConfidenceParameters, confidence, may_be
-from mapweave.fusion.decision import DecisionParameters, Hypothesis, decide, evidence, runner_up
-from mapweave.fusion.extrapolation import ExtrapolationParameters, holds, reach
+from mapweave.fusion.confidence import confidence, may_be
+from mapweave.fusion.decision import Hypothesis, decide, evidence, runner_up
+from mapweave.fusion.extrapolation import holds, reach
 from mapweave.fusion.mirrored import mirrored, told_if_mirrored
-from mapweave.fusion.places import PlaceParameters, compare_at_places, located
-from mapweave.fusion.rooms import RoomParameters, outside
+from mapweave.fusion.parameters import FusionParameters, chosen
+from mapweave.fusion.places import compare_at_places, located
+from mapweave.fusion.rooms import outside
 from mapweave.geometry import se2
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.maps import Alignment, LineMap, RobotMap
-from mapweave.matching.distance_field import DistanceFieldParameters
+from mapweave.matching.coarse_places import coarse_places
+from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import (
-    HypothesisParameters,
     PreparedMap,
     different,
     hypothesise,
     propose_all,
     propose_by_walls,
 )
-from mapweave.matching.icp import IcpParameters, Target, align_all
-from mapweave.matching.verification import (
-    VerificationParameters,
-    shared_complexity,
-    verify,
-)
-from mapweave.parameters import StageParameters, derived
+from mapweave.matching.icp import Target, align_all
+from mapweave.matching.verification import shared_complexity, verify
 from mapweave.reasons import Reason, ReasonKind
 
+__all__ = ["FusionParameters", "align", "align_maps", "compare", "find_alignments", "prepare"]
 
-class FusionParameters(StageParameters):
-    """One model for each stage."""
-
-    # Who stays longer in a room is not surer of which room it is.
-    raster: DistanceFieldParameters = derived(
-        lambda c: DistanceFieldParameters.of(c, same_wall=0.5)
-    )
-    hypotheses: HypothesisParameters = derived(HypothesisParameters.of)
-    # Right transforms contradict next to nothing, wrong ones a metre in ten: at a weight of 5 the
-    # right one scored highest for every pair of stretches with 10 m and more in common.
-    verification: VerificationParameters = derived(
-        lambda c: VerificationParameters.of(c, contradiction_weight=5.0, moved_weight=0.1)
-    )
-    icp: IcpParameters = derived(
-        lambda c: IcpParameters.of(
-            c, start_scale=0.25, end_scale=5 * c.sensor.range_sigma, shrink=0.6
-        )
-    )
-    icp_samples: int = Field(250, ge=10, description="of a map's walls, aligning hypotheses")
-    loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
-    confidence: ConfidenceParameters = ConfidenceParameters()
-    rooms: RoomParameters = RoomParameters()
-    places: PlaceParameters = derived(
-        lambda c: PlaceParameters.of(
-            c, verification=VerificationParameters.of(c, contradiction_weight=5.0, moved_weight=0.1)
-        )
-    )
-    decision: DecisionParameters = derived(DecisionParameters.of)
-    reach: ExtrapolationParameters = ExtrapolationParameters()
-    mirrored_wall: float = Field(
-        30.0, gt=0, description="[m] in common of mirrored maps, from which they are told of"
-    )
-    min_wall: float = Field(4.0, gt=0, description="[m] of wall that a map has, to be compared")
+Fields = tuple[DistanceField, DistanceField]
+"""What two maps are judged by: of the reference, and of the other."""
 
 
 def align(
@@ -116,7 +81,7 @@ def align(
     """
     for name, value in (("reference", reference), ("other", other)):
         check_kind(name, value, RobotMap)
-    p = _parameters(parameters, config)
+    p = chosen(parameters, config)
     ours, theirs = (
         [Component(m, c, lambda lines: prepare(lines, p)) for c in m.components]
         for m in (reference, other)
@@ -125,16 +90,6 @@ def align(
     found = [_align(a, b, p) for a, b in pairs]
     sizes = [min(a.size, b.size) for a, b in pairs]
     return told_if_mirrored(found, sizes, p.mirrored_wall, lambda k: _mirrored(*pairs[k], p))
-
-
-def _parameters(parameters: FusionParameters | None, config: Config | None) -> FusionParameters:
-    """Return `parameters`, or else those that derive from `config`; ArgumentError if neither is."""
-    if parameters is not None:
-        check_kind("parameters", parameters, FusionParameters)
-        return parameters
-    config = Config() if config is None else config
-    check_kind("config", config, Config)
-    return FusionParameters.of(config)
 
 
 def _align(first: Component, second: Component, p: FusionParameters) -> Alignment:
@@ -153,7 +108,7 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
     found = compare_at_places(
         first,
         second,
-        None if whole.evidence.is_empty else whole,
+        None if whole.evidence.is_empty or whole.decision == "refused" else whole,
         p.places,
         lambda a, b: compare(first.name, a.shape, second.name, b.shape, p),
     )
@@ -164,8 +119,11 @@ def _mirrored(first: Component, second: Component, p: FusionParameters) -> Align
     """Compare two components, the second one mirrored, by parallel walls alone."""
     if first.whole is None or second.whole is None:
         return None
-    turned = PreparedMap.of(mirrored(second.whole.shape.lines), p.hypotheses, p.raster)
-    return _by_walls(first.name, first.whole.shape, second.name, turned, p)[0]
+    turned = prepare(mirrored(second.whole.shape.lines), p)
+    if turned is None:
+        return None
+    pair = first.name, first.whole.shape, second.name, turned, p
+    return _told_coarsely(*pair) or _by_walls(*pair)[0]
 
 
 def _is_rigid(whole: Alignment, a: PreparedMap, b: PreparedMap, p: FusionParameters) -> bool:
@@ -179,9 +137,10 @@ def _at_place(
 ) -> Alignment:
     """Return `found` with how far the maps go on from there: what is off beyond is others' matter.
 
-    Where the place was proven, its evidence tells how sure that is.
+    Where the place was proven, its evidence tells how sure that is. What is refused is asked no
+    further.
     """
-    if a is None or b is None or found.evidence.is_empty:
+    if a is None or b is None or found.decision == "refused" or found.evidence.is_empty:
         return found
     far = reach(a.raster, b.raster, found.transform, p.verification)
     place = found.confidence if found.decision == "accepted" else None
@@ -203,7 +162,9 @@ def align_maps(
 def prepare(lines: LineMap, p: FusionParameters) -> PreparedMap | None:
     """Return what comparing `lines` takes; None where there is too little wall to compare."""
     wall = lengths(lines.segments).sum()
-    return PreparedMap.of(lines, p.hypotheses, p.raster) if wall >= p.min_wall else None
+    if wall < p.min_wall:
+        return None
+    return PreparedMap(lines, p.hypotheses, p.raster, p.verification)
 
 
 def compare(
@@ -213,6 +174,8 @@ def compare(
     second: PreparedMap | None,
     p: FusionParameters,
     possible: FloatArray | None = None,
+    *,
+    closely: bool = False,
 ) -> Alignment:
     """Find the transform from `second`, called `b`, to `first`, called `a`, both prepared.
 
@@ -223,17 +186,55 @@ def compare(
     possible
         (n, 3) transforms of which one is near the right one, if that is known; without it, the
         two maps propose.
+    closely
+        Whether to look for the best place even where a coarse look tells that none will do.
     """
     if first is None or second is None:
         poor = ReasonKind.SMALL_REFERENCE if first is None else ReasonKind.SMALL_OTHER
         return _no_alignment(a, b, Reason(poor, {"min_wall": p.min_wall}))
     if possible is None:
+        told = None if closely else _told_coarsely(a, first, b, second, p)
+        if told is not None:
+            return told
         found, shifted = _by_walls(a, first, b, second, p)
         if found is not None:
             return found
         possible = propose_all(first, second, shifted, p.hypotheses)
     ranked = find_alignments(first, second, p, possible)
-    return _decided(a, first, b, second, ranked, p)
+    return _decided(a, b, ranked, (first.raster, second.raster), p)
+
+
+def _told_coarsely(
+    a: str, first: PreparedMap, b: str, second: PreparedMap, p: FusionParameters
+) -> Alignment | None:
+    """Return what a coarse look tells, where it does.
+
+    Refused where no place counts as much, coarsely, as must be in common; accepted where the best
+    convinces when it is judged finely, its rivals among the other shifts.
+    """
+    maps = (first.lines, first.coarse), (second.lines, second.coarse)
+    places = coarse_places(*maps, p.hypotheses.coarse, p.verification)
+    if len(places.scores) == 0:
+        return None
+    fields = first.coarse.field, second.coarse.field
+    middle = fields[1].oriented.points.mean(axis=0)
+    leaders = different(places.aligned, places.scores, middle, p.hypotheses)[:2]
+    if places.scores.max() < p.decision.min_common:
+        found = _decided(a, b, _as_hypotheses(places.aligned[leaders], fields, p), fields, p)
+        return found if found.decision == "refused" else None
+    weight, least = p.verification.contradiction_weight, p.decision.min_confidence
+    if may_be(places.scores[leaders].tolist(), weight, p.confidence) < least:
+        return None
+    ranked = find_alignments(first, second, p, places.shifted)
+    found = _decided(a, b, ranked, (first.raster, second.raster), p)
+    return found if found.decision == "accepted" else None
+
+
+def _as_hypotheses(places: FloatArray, fields: Fields, p: FusionParameters) -> list[Hypothesis]:
+    """Judge (k, 3) `places` by `fields`; how complex what is shared is, is not asked."""
+    middle = fields[1].oriented.points.mean(axis=0)
+    there = se2.transform_points
+    return [Hypothesis(t, there(t, middle), verify(*fields, t, p.verification)) for t in places]
 
 
 def _by_walls(
@@ -250,57 +251,38 @@ def _by_walls(
     weight, least = p.verification.contradiction_weight, p.decision.min_confidence
     if may_be(scores[leaders[:2]].tolist(), weight, p.confidence) < least:
         return None, shifted
-    found = _decided(a, first, b, second, find_alignments(first, second, p, shifted), p)
+    ranked = find_alignments(first, second, p, shifted)
+    found = _decided(a, b, ranked, (first.raster, second.raster), p)
     return found if found.decision == "accepted" else None, shifted
 
 
 def _decided(
-    a: str,
-    first: PreparedMap,
-    b: str,
-    second: PreparedMap,
-    ranked: Sequence[Hypothesis],
-    p: FusionParameters,
+    a: str, b: str, ranked: Sequence[Hypothesis], fields: Fields, p: FusionParameters
 ) -> Alignment:
     """Return the alignment that the best of hypotheses is, and what is decided about it."""
     if not ranked:
         return _no_alignment(a, b, Reason(ReasonKind.NO_SHAPE))
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
-    beyond = outside(first.raster, second.raster, best.transform, p.verification, p.rooms)
-    one_room = beyond < p.rooms.min_outside
-    sure *= p.rooms.unique if one_room else 1.0
-    decision, cause = decide(
-        best,
-        rival,
-        sure,
-        p.decision,
-        beyond if one_room else None,
-        rival_is_room=not one_room and _is_room(first, second, best, rival, p),
-    )
-    return Alignment(
-        a,
-        b,
-        best.transform,
-        decision,
-        sure,
-        cause,
-        evidence(best),
-        None if rival is None else runner_up(best, rival),
-    )
+    decision, cause = decide(best, rival, sure, p.decision)
+    if decision != "refused":  # whichever room it is
+        beyond = outside(*fields, best.transform, p.verification, p.rooms)
+        one_room = beyond < p.rooms.min_outside
+        sure *= p.rooms.unique if one_room else 1.0
+        alike = not one_room and _is_room(fields, best, rival, p)
+        little = beyond if one_room else None
+        decision, cause = decide(best, rival, sure, p.decision, little, rival_is_room=alike)
+    other = None if rival is None else runner_up(best, rival)
+    return Alignment(a, b, best.transform, decision, sure, cause, evidence(best), other)
 
 
 def _is_room(
-    first: PreparedMap,
-    second: PreparedMap,
-    best: Hypothesis,
-    rival: Hypothesis | None,
-    p: FusionParameters,
+    fields: Fields, best: Hypothesis, rival: Hypothesis | None, p: FusionParameters
 ) -> bool:
     """Whether a rival that is near lays one room on another, and nothing else."""
     if rival is None or rival.verdict.score <= p.decision.max_rival * best.verdict.score:
         return False
-    told = outside(first.raster, second.raster, rival.transform, p.verification, p.rooms)
+    told = outside(*fields, rival.transform, p.verification, p.rooms)
     return told < p.rooms.min_outside
 
 
@@ -312,8 +294,19 @@ def find_alignments(
     if len(transforms) == 0:
         return []
     aligned = _refined(first, second, transforms, p)
-    verdicts = [verify(first.raster, second.raster, t, p.verification) for t in aligned]
-    middle = second.raster.oriented.points.mean(axis=0)
+    return _ranked(first, second, aligned, (first.raster, second.raster), p)
+
+
+def _ranked(
+    first: PreparedMap,
+    second: PreparedMap,
+    aligned: FloatArray,
+    fields: Fields,
+    p: FusionParameters,
+) -> list[Hypothesis]:
+    """Return the best two that differ of (k, 3) `aligned`, by what `fields` say of them."""
+    verdicts = [verify(*fields, t, p.verification) for t in aligned]
+    middle = fields[1].oriented.points.mean(axis=0)
     # Two that ended in the same place are one, and not each other's rival.
     ranked = different(aligned, np.array([v.score for v in verdicts]), middle, p.hypotheses)
     return [
@@ -321,7 +314,7 @@ def find_alignments(
             aligned[k],
             se2.transform_points(aligned[k], middle),
             verdicts[k],
-            _complexity(first, second, aligned[k], p),
+            _complexity(first.lines, second.lines, aligned[k], fields, p),
         )
         for k in ranked[:2]
     ]
@@ -341,13 +334,14 @@ def _refined(
 
 
 def _complexity(
-    first: PreparedMap, second: PreparedMap, transform: FloatArray, p: FusionParameters
+    first: LineMap, second: LineMap, transform: FloatArray, fields: Fields, p: FusionParameters
 ) -> float:
     """Return the complexity of what is shared [rad²], in the map that shows more of it (V2)."""
+    here, there = fields
     back = se2.inverse(transform)
     return max(
-        shared_complexity(first.raster, second.raster, transform, second.lines, p.verification),
-        shared_complexity(second.raster, first.raster, back, first.lines, p.verification),
+        shared_complexity(here, there, transform, second, p.verification),
+        shared_complexity(there, here, back, first, p.verification),
     )
 
 

@@ -82,13 +82,13 @@ class Hypothesis:
     verdict
         What both maps say of it.
     complexity
-        [rad²] of what is shared (V2).
+        [rad²] of what is shared (V2); None where it was not asked for: what is refused anyway.
     """
 
     transform: FloatArray
     place: FloatArray
     verdict: Verdict
-    complexity: float
+    complexity: float | None = None
 
 
 def decide(
@@ -113,7 +113,7 @@ def decide(
         return "refused", Reason(ReasonKind.CONTRADICTED, match)
     if v.held < p.min_held:
         return "ambiguous", Reason(ReasonKind.PARALLEL, match)
-    if best.complexity < p.min_complexity and v.held < p.plain_held:
+    if (best.complexity or 0.0) < p.min_complexity and v.held < p.plain_held:
         return "ambiguous", Reason(ReasonKind.STRAIGHT, match)
     weak = rival is not None and (rival_is_room or rival.verdict.overlap < p.min_overlap)
     most = p.max_weak_rival if weak else p.max_rival

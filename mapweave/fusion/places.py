@@ -119,6 +119,8 @@ def _windows(
     Two windows are compared once, however many places are in them.
     """
     found: dict[tuple[int, int], tuple[Window, Window]] = {}
+    if len(first.submaps) == len(second.submaps) == 1:
+        return []
     for here, there in _proposed(first, second, p):
         ours, theirs = first.about(here, p.radius), second.about(there, p.radius)
         if ours is None or theirs is None:

@@ -6,6 +6,7 @@ plain corridor before it does not: it fits before every door.
 """
 
 import math
+from functools import reduce
 
 import numpy as np
 import scipy
@@ -127,8 +128,9 @@ def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArr
     door; an extent is the longer side of one, by how far it spreads.
     """
     rows, columns = (n // p.coarse for n in raster.depth.shape)
-    cut = raster.depth[: rows * p.coarse, : columns * p.coarse]
-    depth = cut.reshape(rows, p.coarse, columns, p.coarse).max(axis=(1, 3))
+    cut, step = raster.depth[: rows * p.coarse, : columns * p.coarse], range(p.coarse)
+    parts = [cut[i :: p.coarse, j :: p.coarse] for i in step for j in step]
+    depth = reduce(np.maximum, parts)
     found, count = scipy.ndimage.label(depth > p.passage, np.ones((3, 3)))
     label = np.asarray(found, dtype=np.int64)
     if count == 0:

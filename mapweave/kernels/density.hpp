@@ -21,9 +21,10 @@ inline int64_t place(double along, double radius) {
 }
 
 inline int64_t count_bits(uint64_t word) {
-  int64_t n = 0;
-  for (; word; word &= word - 1) ++n;
-  return n;
+  word -= (word >> 1) & 0x5555555555555555;
+  word = (word & 0x3333333333333333) + ((word >> 2) & 0x3333333333333333);
+  word = (word + (word >> 4)) & 0x0f0f0f0f0f0f0f0f;
+  return static_cast<int64_t>((word * 0x0101010101010101) >> 56);
 }
 
 inline Out<double> times_drawn(In<double, 2> points, In<double, 2> normals, In<double, 1> length, double radius,

@@ -21,6 +21,7 @@
 #include "scores.hpp"
 #include "segmentation.hpp"
 #include "shape_index.hpp"
+#include "shifts.hpp"
 #include "slivers.hpp"
 #include "viewpoints.hpp"
 #include "windows.hpp"
@@ -48,6 +49,7 @@ NB_MODULE(_compiled, m) {
   bind_scores(m);
   bind_segmentation(m);
   bind_shape_index(m);
+  bind_shifts(m);  // of the views above
   bind_slivers(m);
   bind_viewpoints(m);
   bind_pose_evidence(m);  // of the points and viewpoints above

@@ -2,6 +2,7 @@
 // candidates. The twin and the words are in matching/place_views.py.
 #pragma once
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "arrays.hpp"
@@ -39,6 +40,22 @@ class PlaceView {
     }
     return sum;
   }
+
+  int64_t rows() const { return static_cast<int64_t>(rows_); }
+  int64_t columns() const { return static_cast<int64_t>(columns_); }
+  double cell() const { return cell_; }
+  uint8_t code(int64_t row, int64_t column) const { return codes_[row * columns() + column]; }
+  // [m], of a cell, which need not be there.
+  std::pair<double, double> centre(int64_t row, int64_t column) const {
+    return {origin_[0] + (static_cast<double>(row) + 0.5) * cell_,
+            origin_[1] + (static_cast<double>(column) + 0.5) * cell_};
+  }
+  bool holds(double x, double y) const {
+    const double row = (x - origin_[0]) / cell_, column = (y - origin_[1]) / cell_;
+    return row >= 0 && column >= 0 && row <= static_cast<double>(rows_) && column <= static_cast<double>(columns_);
+  }
+  size_t samples() const { return samples_.size() / 4; }
+  const double* sample(size_t k) const { return samples_.data() + 4 * k; }
 
  private:
   size_t rows_, columns_;

@@ -220,6 +220,25 @@ inline Out<float> depths(In<double, 2> corners, In<int64_t, 1> starts, In<double
   return give(std::move(depth), {static_cast<size_t>(r), static_cast<size_t>(c)});
 }
 
+// What each cell says: where the wall near it faces, that it was seen through, or nothing.
+inline Out<uint8_t> cell_codes(In<int32_t, 2> nearest, In<float, 2> distance, In<float, 2> depth, In<uint8_t, 1> facing,
+                               double closeness, double clearance, uint8_t nothing, uint8_t seen_through) {
+  for (const auto& other : {distance, depth})
+    if (other.shape(0) != nearest.shape(0) || other.shape(1) != nearest.shape(1))
+      throw std::invalid_argument("nearest, distance and depth: of one shape expected");
+  const float close = static_cast<float>(closeness), deep = static_cast<float>(clearance);
+  std::vector<uint8_t> codes(nearest.size());
+  for (size_t k = 0; k < codes.size(); ++k) {
+    codes[k] = depth.data()[k] > deep ? seen_through : nothing;
+    if (!(distance.data()[k] < close)) continue;
+    const int64_t sample = nearest.data()[k];
+    if (sample < 0 || sample >= static_cast<int64_t>(facing.shape(0)))
+      throw std::invalid_argument("nearest: numbers of samples expected");
+    codes[k] = facing(sample);
+  }
+  return give(std::move(codes), {nearest.shape(0), nearest.shape(1)});
+}
+
 }  // namespace rasters
 
 inline void bind_rasters(nb::module_& m) {
@@ -227,6 +246,8 @@ inline void bind_rasters(nb::module_& m) {
         nb::arg("rows"), nb::arg("columns"));
   m.def("filled_cells", &rasters::filled_cells, nb::arg("corners"), nb::arg("starts"), nb::arg("origin"),
         nb::arg("cell"), nb::arg("rows"), nb::arg("columns"));
+  m.def("cell_codes", &rasters::cell_codes, nb::arg("nearest"), nb::arg("distance"), nb::arg("depth"),
+        nb::arg("facing"), nb::arg("closeness"), nb::arg("clearance"), nb::arg("nothing"), nb::arg("seen_through"));
   m.def("depths", &rasters::depths, nb::arg("corners"), nb::arg("starts"), nb::arg("origin"), nb::arg("cell"),
         nb::arg("rows"), nb::arg("columns"));
 }

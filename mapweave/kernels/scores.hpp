@@ -7,7 +7,7 @@
 
 namespace scores {
 
-inline Out<double> look_up_scores(In<float, 2> samples, In<double, 1> weight, In<float, 2> motions, In<int32_t, 2> codes,
+inline Out<double> look_up_scores(In<float, 2> samples, In<double, 1> weight, In<float, 2> motions, In<uint8_t, 2> codes,
                                   In<float, 1> worth, int64_t directions) {
   const size_t n = samples.shape(0), k = motions.shape(0);
   const int64_t rows = static_cast<int64_t>(codes.shape(0)), columns = static_cast<int64_t>(codes.shape(1));
@@ -15,9 +15,9 @@ inline Out<double> look_up_scores(In<float, 2> samples, In<double, 1> weight, In
     throw std::invalid_argument("samples (n, 3), weight (n,), motions (k, 5), codes of a cell or more expected");
   if (directions < 1 || (directions & (directions - 1)))
     throw std::invalid_argument("directions: a power of two expected");
-  const int64_t most = static_cast<int64_t>(worth.shape(0)) - directions;
-  for (int64_t c = 0; c < rows * columns; ++c)
-    if (codes.data()[c] < 0 || codes.data()[c] > most) throw std::invalid_argument("codes: places in worth expected");
+  const uint8_t most = *std::max_element(codes.data(), codes.data() + rows * columns);
+  if ((most + 1) * directions > static_cast<int64_t>(worth.shape(0)))
+    throw std::invalid_argument("codes: rows of worth expected");
   const float last_row = static_cast<float>(rows - 1), last_column = static_cast<float>(columns - 1);
   const int32_t mask = static_cast<int32_t>(directions - 1);
   std::vector<double> sums(k, 0.0);
@@ -31,7 +31,7 @@ inline Out<double> look_up_scores(In<float, 2> samples, In<double, 1> weight, In
       const int64_t row = static_cast<int64_t>(x > 0 ? std::min(x, last_row) : 0.0f);
       const int64_t column = static_cast<int64_t>(y > 0 ? std::min(y, last_column) : 0.0f);
       const int32_t direction = static_cast<int32_t>(p[2] + turn) & mask;
-      sum += static_cast<double>(worth.data()[codes.data()[row * columns + column] + direction]) * weight.data()[i];
+      sum += static_cast<double>(worth.data()[codes.data()[row * columns + column] * directions + direction]) * weight.data()[i];
     }
     sums[t] = sum;
   }

@@ -9,14 +9,14 @@ from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.point_map import Floats
 
 Floats32 = NDArray[np.float32]
-Ints32 = NDArray[np.int32]
+Codes = NDArray[np.uint8]
 
 
 def look_up_scores_numpy(
     samples: Floats32,
     weight: Floats,
     motions: Floats32,
-    codes: Ints32,
+    codes: Codes,
     worth: Floats32,
     directions: int,
 ) -> Floats:
@@ -26,7 +26,7 @@ def look_up_scores_numpy(
     rows, columns = codes.shape
     i = np.clip(c * x - s * y + x0, 0, rows - 1).astype(np.int32)
     j = np.clip(s * x + c * y + y0, 0, columns - 1).astype(np.int32)
-    said = codes.ravel()[i * columns + j]
+    said = codes.ravel()[i * columns + j].astype(np.int64) * directions
     direction = (facing + turn).astype(np.int32) & (directions - 1)
     return np.asarray(worth[said + direction] @ weight, dtype=np.float64)
 
@@ -35,7 +35,7 @@ def look_up_scores(
     samples: Floats32,
     weight: Floats,
     motions: Floats32,
-    codes: Ints32,
+    codes: Codes,
     worth: Floats32,
     directions: int,
 ) -> Floats:
@@ -51,7 +51,7 @@ def look_up_scores(
         (k, 5) cosine and sine of the turn, the shift [cells, cells] and the turn [directions].
         Turned directions are above 0.
     codes
-        (rows, columns) where in `worth` a cell's row begins: beyond the rim, what the rim says.
+        (rows, columns) which row of `worth` a cell is worth: beyond the rim, what the rim says.
     worth
         Flat rows of what a cell is worth for a sample, by the sample's turned direction.
 

@@ -133,7 +133,7 @@ def main_directions(
 
 
 def likely_turns(
-    reference: FloatArray, other: FloatArray, count: int, separation: float
+    reference: FloatArray, other: FloatArray, count: int, separation: float, least: float = 0.0
 ) -> FloatArray:
     """Return the turns that make the walls of `other` parallel to those of `reference`.
 
@@ -148,6 +148,8 @@ def likely_turns(
         How many turns at most.
     separation
         [rad] between any two.
+    least
+        Share of the parallel wall of the likeliest that each must have.
 
     Returns
     -------
@@ -161,6 +163,8 @@ def likely_turns(
     )
     likely = np.fft.irfft(ours * theirs.conj(), bins)
     peaks = np.flatnonzero((likely >= np.roll(likely, 1)) & (likely > np.roll(likely, -1)))
+    if least > 0:
+        peaks = peaks[likely[peaks] >= least * likely.max()]
     kept: list[float] = []
     for peak in peaks[np.argsort(-likely[peaks], kind="stable")]:
         turn = float(np.mod(peak * DIRECTED_PERIOD / bins + np.pi, DIRECTED_PERIOD) - np.pi)

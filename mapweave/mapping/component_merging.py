@@ -207,7 +207,7 @@ class ComponentMerger:
         """Compare two components anywhere, and where that leaves it open, where track was lost."""
         first, second = self._shape(submaps, older), self._shape(submaps, younger)
         names, p = ("older", "younger"), self._p
-        anywhere = compare(names[0], first, names[1], second, p.fusion)
+        anywhere = compare(names[0], first, names[1], second, p.fusion, closely=True)
         possible = _between_them(submaps, older, younger, p)
         if anywhere.decision == "accepted" or len(possible) == 0:
             return anywhere

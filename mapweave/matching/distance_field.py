@@ -76,7 +76,7 @@ class DistanceField:
     nearest: Int32Array
     distance: Float32Array
     depth: Float32Array
-    codes: dict[tuple[float, float], Int32Array] = field(
+    codes: dict[tuple[float, float], rasters.Codes] = field(
         default_factory=dict, init=False, repr=False
     )
     things: dict[tuple[float, float], BoolArray] = field(

@@ -45,8 +45,9 @@ def _free_standing(raster: DistanceField, gap: float, max_side: float) -> BoolAr
 
 def _bounds(points: FloatArray, thing: IntArray, count: int) -> FloatArray:
     """(count,) longer sides [m] of the upright rectangles around the points of each thing."""
-    high, low = np.full((count, 2), -np.inf), np.full((count, 2), np.inf)
-    np.maximum.at(high, thing, points)
-    np.minimum.at(low, thing, points)
-    spread: FloatArray = (high - low).max(axis=1)
+    order = np.argsort(thing, kind="stable")
+    first = np.flatnonzero(np.diff(thing[order], prepend=-1))
+    sorted_points, spread = points[order], np.full(count, -np.inf)
+    apart = np.maximum.reduceat(sorted_points, first) - np.minimum.reduceat(sorted_points, first)
+    spread[thing[order][first]] = apart.max(axis=1)
     return spread

@@ -19,6 +19,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.kernels.matching.distinct import distinct
 from mapweave.lines.directions import likely_turns
 from mapweave.maps import LineMap
+from mapweave.matching.coarse_places import CoarseMap, CoarsePlaceParameters
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.fft_correlation import FftCorrelationParameters, Marks, correlate
 from mapweave.matching.field_icp import FieldIcpParameters, align_on_raster
@@ -36,6 +37,7 @@ class HypothesisParameters(StageParameters):
     )
     corners: CornerParameters = CornerParameters()
     correlation: FftCorrelationParameters = derived(FftCorrelationParameters.of)
+    coarse: CoarsePlaceParameters = derived(CoarsePlaceParameters.of)
     turn_separation: float = Field(0.17, gt=0, description="[rad] between likely turns: 10°")
     alignment: FieldIcpParameters = FieldIcpParameters()
     proposal_samples: int = Field(60, ge=10, description="of a map's walls, scoring proposals")
@@ -56,8 +58,19 @@ class PreparedMap:
     """A line map with what comparing it takes, made once for each map, and when it is asked for."""
 
     lines: LineMap
-    raster: DistanceField
     parameters: HypothesisParameters
+    raster_parameters: DistanceFieldParameters
+    verification: VerificationParameters
+
+    @cached_property
+    def raster(self) -> DistanceField:
+        """Its walls and the free space, as fine as decides."""
+        return DistanceField.of(self.lines, self.raster_parameters)
+
+    @cached_property
+    def coarse(self) -> CoarseMap:
+        """The same, as it is looked for first."""
+        return CoarseMap.of(self.lines, self.parameters.coarse, self.verification)
 
     @cached_property
     def windows(self) -> tuple[Windows, ...]:
@@ -68,13 +81,6 @@ class PreparedMap:
     def corners(self) -> Corners:
         """Pairs of walls that meet."""
         return find_corners(self.lines.segments, self.parameters.corners)
-
-    @classmethod
-    def of(
-        cls, lines: LineMap, hypotheses: HypothesisParameters, raster: DistanceFieldParameters
-    ) -> "PreparedMap":
-        """Prepare `lines`, which have at least one segment."""
-        return cls(lines, DistanceField.of(lines, raster), hypotheses)
 
 
 def hypothesise(

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray
 from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view, score_views
+from mapweave.kernels.matching.rasters import cell_codes
 from mapweave.kernels.matching.shape_index import IndexSettings, shape_index
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
@@ -170,11 +171,9 @@ def _view(lines: LineMap, p: PlaceIndexParameters) -> PlaceView:
 
 def _codes(field: DistanceField, p: VerificationParameters) -> Codes:
     """(rows, columns) what each cell says: a row of `_worth`."""
-    code = np.where(field.depth > p.clearance, SEEN_THROUGH, NOTHING).astype(np.uint8)
-    near = field.distance < p.closeness
     facing = (_turns(field.oriented.normals) * DIRECTIONS).astype(np.uint8) % DIRECTIONS
-    code[near] = facing[field.nearest[near]]
-    return code
+    said = p.closeness, p.clearance, NOTHING, SEEN_THROUGH
+    return cell_codes(field.nearest, field.distance, field.depth, facing, *said)
 
 
 def _turns(normals: FloatArray) -> FloatArray:

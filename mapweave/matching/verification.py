@@ -6,13 +6,15 @@ wall of one map where the other saw through is a contradiction.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array
+from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray
 from mapweave.kernels.matching.judging import judge_samples
+from mapweave.kernels.matching.rasters import Codes, cell_codes
 from mapweave.kernels.scores import look_up_scores
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
@@ -138,7 +140,8 @@ def _coarse_one_way(
     codes, missing = _codes(reference, p), worth_of_missing(other, p)[::stride]
     scores = np.zeros(len(transforms))
     for each in np.unique(missing):
-        some, worth = missing == each, _worth(p, float(each))
+        some = missing == each
+        worth = _worth(p.min_cosine, p.contradiction_weight, float(each))
         scores += look_up_scores(samples[some], weight[some], motions, codes, worth, DIRECTIONS)
     return scores
 
@@ -149,33 +152,40 @@ def _directions(normals: FloatArray) -> FloatArray:
     return np.asarray((turns % 1.0 + 4) * DIRECTIONS)
 
 
-def _codes(raster: DistanceField, p: VerificationParameters) -> Int32Array:
-    """(rows, columns) what each cell says: a row of `_worth`, as an offset into it; made once."""
+def _codes(raster: DistanceField, p: VerificationParameters) -> Codes:
+    """(rows, columns) what each cell says: a row of `_worth`; made once."""
     limits = p.closeness, p.clearance
     if limits not in raster.codes:
-        raster.codes[limits] = _coded(raster, *limits)
+        codes = said_by_cells(raster, *limits)
+        codes[[0, -1], :] = codes[:, [0, -1]] = (
+            NOTHING  # the rim stands for all that lies beyond it
+        )
+        raster.codes[limits] = codes
     return raster.codes[limits]
 
 
-def _coded(raster: DistanceField, closeness: float, clearance: float) -> Int32Array:
-    """Work out `_codes`."""
-    row = np.where(raster.depth > clearance, np.int32(SEEN_THROUGH), np.int32(NOTHING))
-    near = raster.distance < closeness
-    facing = _directions(raster.oriented.normals).astype(np.int32) & (DIRECTIONS - 1)
-    row[near] = facing[raster.nearest[near]]
-    row[[0, -1], :] = row[:, [0, -1]] = NOTHING  # the rim stands for all that lies beyond it
-    return row * np.int32(DIRECTIONS)
+def said_by_cells(raster: DistanceField, closeness: float, clearance: float) -> Codes:
+    """(rows, columns) which of DIRECTIONS the wall near each cell faces, or what else it says.
+
+    SEEN_THROUGH where space is free by more than `clearance` [m], else NOTHING.
+    """
+    facing = (_directions(raster.oriented.normals).astype(np.int32) & (DIRECTIONS - 1)).astype(
+        np.uint8
+    )
+    said = closeness, clearance, NOTHING, SEEN_THROUGH
+    return cell_codes(raster.nearest, raster.distance, raster.depth, facing, *said)
 
 
-def _worth(p: VerificationParameters, missing: float = 1.0) -> Float32Array:
+@lru_cache(16)
+def _worth(min_cosine: float, contradiction_weight: float, missing: float) -> Float32Array:
     """What a metre of wall counts, by the cell's code and the wall's direction, flat.
 
     Where it is `missing`, so many metres of what it contradicts.
     """
     turn = 2 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
     worth: Float32Array = np.zeros((SEEN_THROUGH + 1, DIRECTIONS), dtype=np.float32)
-    worth[:DIRECTIONS] = np.cos(turn[:, None] - turn) > p.min_cosine
-    worth[SEEN_THROUGH] = -p.contradiction_weight * missing
+    worth[:DIRECTIONS] = np.cos(turn[:, None] - turn) > min_cosine
+    worth[SEEN_THROUGH] = -contradiction_weight * missing
     return worth.ravel()
 
 

@@ -15,7 +15,7 @@ FIRST, SECOND = part(BUILDING, 0, 20), part(BUILDING, 8, 31)
 
 def proposed(p: FusionParameters) -> tuple[int, int]:
     """Return how many transforms windows propose, and how many corners do."""
-    a, b = (PreparedMap.of(m, p.hypotheses, p.raster) for m in (FIRST, SECOND))
+    a, b = (PreparedMap(m, p.hypotheses, p.raster, p.verification) for m in (FIRST, SECOND))
     hypotheses: HypothesisParameters = p.hypotheses
     windows = match_all(a.windows, b.windows, hypotheses.windows)
     return len(windows), len(propose(a.corners, b.corners, hypotheses.corners))

@@ -23,16 +23,16 @@ class PlaceViewNumpy:
     """Twin of the compiled class."""
 
     def __init__(self, codes: Codes, origin: FloatArray, cell: float, samples: FloatArray) -> None:
-        self._codes, self._origin, self._cell, self._samples = codes, origin, cell, samples
+        self.codes, self.origin, self.cell, self.samples = codes, origin, cell, samples
 
     def worth(self, other: "PlaceViewNumpy", pose: FloatArray, table: FloatArray) -> float:
         """Return what the walls of `other` count in this map, at the `pose` (3,) of it."""
         c, s = np.cos(pose[2]), np.sin(pose[2])
-        x, y, facing, metres = other._samples.T
+        x, y, facing, metres = other.samples.T
         placed = np.column_stack([c * x - s * y + pose[0], s * x + c * y + pose[1]])
-        cells = np.floor((placed - self._origin) / self._cell).astype(np.int64)
-        inside = np.all((cells >= 0) & (cells < self._codes.shape), axis=1)
-        code = self._codes[tuple(cells[inside].T)]
+        cells = np.floor((placed - self.origin) / self.cell).astype(np.int64)
+        inside = np.all((cells >= 0) & (cells < self.codes.shape), axis=1)
+        code = self.codes[tuple(cells[inside].T)]
         turn = ((facing + (pose[2] / (2 * np.pi) + 2)) * table.shape[1]).astype(np.int64)
         return float((metres[inside] * table[code, turn[inside] % table.shape[1]]).sum())
 

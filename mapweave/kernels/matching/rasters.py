@@ -8,9 +8,12 @@ from typing import cast
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from mapweave.kernels.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
 from mapweave.kernels.loading import COMPILED
+
+Codes = NDArray[np.uint8]
 
 
 def nearest_samples_numpy(
@@ -95,6 +98,56 @@ def depths(
         return depths_numpy(polygons, origin, cell, rows, columns)
     depth = COMPILED.depths(*_joined(polygons), origin, cell, rows, columns)
     return cast("Float32Array", depth)
+
+
+def cell_codes_numpy(
+    nearest: Int32Array,
+    distance: Float32Array,
+    depth: Float32Array,
+    facing: Codes,
+    closeness: float,
+    clearance: float,
+    nothing: int,
+    seen_through: int,
+) -> Codes:
+    """Twin of `cell_codes`."""
+    codes = np.where(depth > clearance, seen_through, nothing).astype(np.uint8)
+    near = distance < closeness
+    codes[near] = facing[nearest[near]]
+    return codes
+
+
+def cell_codes(
+    nearest: Int32Array,
+    distance: Float32Array,
+    depth: Float32Array,
+    facing: Codes,
+    closeness: float,
+    clearance: float,
+    nothing: int,
+    seen_through: int,
+) -> Codes:
+    """Return (rows, columns) what each cell says of a wall in it.
+
+    Where wall is within `closeness` [m], which way that faces; else `seen_through` where space is
+    free by more than `clearance` [m], or `nothing`.
+
+    Parameters
+    ----------
+    nearest, distance, depth
+        (rows, columns) the sample nearest to each cell, how far it is [m], and how deep in free
+        space the cell lies [m].
+    facing
+        (n,) which way the samples face, by number.
+
+    Raises
+    ------
+    ValueError
+        Where shapes do not agree.
+    """
+    compute = cell_codes_numpy if COMPILED is None else COMPILED.cell_codes
+    codes = compute(nearest, distance, depth, facing, closeness, clearance, nothing, seen_through)
+    return cast("Codes", codes)
 
 
 def _joined(polygons: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:

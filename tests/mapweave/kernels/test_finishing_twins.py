@@ -141,7 +141,7 @@ def test_samples_are_worth_the_same_at_many_motions(seed: int, count: int, motio
     samples = rng.uniform(-9, 9, (count, 3)) + np.array([0, 0, 200])
     angle, shift = rng.uniform(-3, 3, motions), rng.uniform(0, 20, (motions, 2))
     moved = np.column_stack([np.cos(angle), np.sin(angle), shift, angle * 64 / (2 * np.pi)])
-    codes = 64 * rng.integers(0, 3, (20, 15), dtype=np.int32)
+    codes = rng.integers(0, 3, (20, 15), dtype=np.uint8)
     asked = (samples.astype(np.float32), rng.uniform(0, 1, count), moved.astype(np.float32), codes)
     worth = rng.normal(0, 1, 3 * 64).astype(np.float32)
     same(scores.look_up_scores(*asked, worth, 64), scores.look_up_scores_numpy(*asked, worth, 64))

@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 
 from mapweave.kernels.arrays import FloatArray, IntArray
 from mapweave.kernels.loading import COMPILED
-from mapweave.kernels.matching.place_views import PlaceViewNumpy, score_views_numpy
+from mapweave.kernels.matching.place_views import Codes, PlaceViewNumpy, score_views_numpy
+from mapweave.kernels.matching.rasters import cell_codes, cell_codes_numpy
 from mapweave.kernels.matching.shape_index import Found, IndexSettings, ShapeIndexNumpy
+from mapweave.kernels.matching.shifts import best_shifts_numpy
 
 seeds = st.integers(0, 2**32 - 1)
 SETTINGS = IndexSettings(6.0, 0.15, 36, 0.3, 0.1, 0.09, 0.25, 90)
@@ -133,3 +135,56 @@ def test_where_words_are_many_the_rarest_are_looked_at(make: type) -> None:
     words, kind = (np.concatenate(parts) for parts in zip(common, rare, strict=True))
     found = index.places(words, kind, np.zeros(2), np.ones(21, dtype=np.uint8), 10, 5, 0.35, 0.1)
     assert found[0].tolist() == [20]
+
+
+def a_raster(rng: np.random.Generator, walls: int) -> tuple[Codes, FloatArray, float, FloatArray]:
+    """Return codes, origin, cell and samples of a map of 32 directions."""
+    shape = rng.integers(1, 40, 2)
+    codes = rng.integers(0, 34, shape).astype(np.uint8)
+    codes[rng.random(shape) < 0.6] = 32
+    origin = rng.normal(0, 3, 2)
+    places = origin + rng.uniform(0.01, 0.99, (walls, 2)) * shape * 0.2
+    return (
+        codes,
+        origin,
+        0.2,
+        np.column_stack([places, rng.random(walls), rng.uniform(0, 1, walls)]),
+    )
+
+
+@compiled
+@settings(max_examples=30, deadline=None)
+@given(seeds, st.sampled_from([0, 1, 40]), st.sampled_from([0, 3, 1000]))
+def test_shifts_count_the_same(seed: int, walls: int, count: int) -> None:
+    assert COMPILED is not None
+    rng = np.random.default_rng(seed)
+    maps = [a_raster(rng, n) for n in (walls, 40)]
+    asked = rng.uniform(-np.pi, np.pi, 3), 0.4, 32, 5, count
+    ours = COMPILED.best_shifts(*(COMPILED.PlaceView(*m) for m in maps), *asked)
+    theirs = best_shifts_numpy(PlaceViewNumpy(*maps[0]), PlaceViewNumpy(*maps[1]), *asked)
+    for a, b in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-9, rtol=1e-9)
+
+
+@compiled
+def test_walls_beyond_their_raster_are_refused_by_both() -> None:
+    assert COMPILED is not None
+    codes, origin, cell, samples = a_raster(np.random.default_rng(1), 1)
+    view = codes, origin, cell, samples + np.array([100.0, 0, 0, 0])
+    asked = np.zeros(1), 0.4, 32, 5, 1
+    with pytest.raises(ValueError, match="inside of the raster"):
+        COMPILED.best_shifts(COMPILED.PlaceView(*view), COMPILED.PlaceView(*view), *asked)
+    with pytest.raises(ValueError, match="inside of the raster"):
+        best_shifts_numpy(PlaceViewNumpy(*view), PlaceViewNumpy(*view), *asked)
+
+
+@compiled
+@settings(max_examples=30, deadline=None)
+@given(seeds, st.sampled_from([1, 40]))
+def test_cells_say_the_same(seed: int, samples: int) -> None:
+    rng = np.random.default_rng(seed)
+    nearest = rng.integers(0, samples, (9, 13)).astype(np.int32)
+    distance, depth = rng.uniform(0, 1, (2, 9, 13)).astype(np.float32)
+    facing = rng.integers(0, 64, samples).astype(np.uint8)
+    asked = nearest, distance, depth, facing, 0.25, 0.3, 64, 65
+    np.testing.assert_array_equal(cell_codes(*asked), cell_codes_numpy(*asked))

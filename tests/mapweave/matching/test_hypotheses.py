@@ -25,7 +25,10 @@ P = HypothesisParameters()
 
 
 def proposed(reference: LineMap, other: LineMap) -> tuple[FloatArray, FloatArray]:
-    shapes = [PreparedMap.of(lines, P, DistanceFieldParameters()) for lines in (reference, other)]
+    shapes = [
+        PreparedMap(lines, P, DistanceFieldParameters(), VerificationParameters())
+        for lines in (reference, other)
+    ]
     return hypothesise(shapes[0], shapes[1], P, VerificationParameters())
 
 
@@ -102,7 +105,7 @@ def test_where_most_walls_run_other_ways_shapes_propose_the_true_pose(
 def test_hypotheses_lie_wall_on_wall() -> None:
     """Whoever proposes is off by what alignment mends: 0.3 m here, and 2°."""
     shapes = [
-        PreparedMap.of(lines, P, DistanceFieldParameters())
+        PreparedMap(lines, P, DistanceFieldParameters(), VerificationParameters())
         for lines in (part(BUILDING, 0, 18), part(BUILDING, 8, 30))
     ]
     about = np.array([13.0, 1.0, 0.0])  # where both looked
