@@ -124,6 +124,7 @@ bench-faults: $(KERNELS)
 	$(BIN)/python -m benchmarks kills --events $(or $(EVENTS),50)
 	$(BIN)/python -m benchmarks lossy
 	$(BIN)/python -m benchmarks subscribers
+	$(BIN)/python -m benchmarks crowd
 
 # What was made of the sources; results (demo, team, bench) stay.
 clean:
