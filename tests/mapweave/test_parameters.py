@@ -41,6 +41,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "AlignmentGraphParameters": {},
     "BackendParameters": {"spacing": 0.1},
     "ChangeDetectionParameters": {"spacing": 0.1, "clearance": 0.3, "sight": 10.0},
+    "CoarsePlaceParameters": {"width": 0.4, "closeness": 0.3125, "clearance": 0.5},
     "ComponentMergingParameters": {"reach": 3.0, "max_reach": 7.5},
     "ContradictionParameters": {},
     "CorrelativeParameters": {"cell": 0.1, "reach": 1.2},
@@ -82,9 +83,9 @@ MEASURED: dict[str, dict[str, object]] = {
         "sight": 25.0,
     },
     "OwnBodyParameters": {"still": 0.06, "moved": 0.1, "edge": 0.25, "depth": 0.1},
-    "PartParameters": {"length": 36.0},
     "PlaceFinderParameters": {},
     "PlaceIndexParameters": {},
+    "PlaceParameters": {"radius": 18.0},
     "PlaceRecognitionParameters": {},
     "PoseCovarianceParameters": {"noise": 0.1},
     "ReachabilityParameters": {

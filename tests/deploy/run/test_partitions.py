@@ -80,6 +80,7 @@ def test_two_halves_with_a_coordinator_each_are_one_joint_map_after_the_link_ret
         until(partial(says, folder, "server", "2 coordinators of the team are here"))
 
 
+@pytest.mark.slow  # they drive for 40 s
 def test_robots_cut_off_from_the_coordinator_go_on_comparing_and_are_in_one_frame(
     halves: Halves, tmp_path: Path
 ) -> None:

@@ -108,7 +108,7 @@ def test_a_pair_that_was_refused_is_compared_again_when_a_part_of_one_has_left_i
     """As a submap that was tracked to a wrong place, and contradicted the other component there."""
     compared: list[str] = []
 
-    def refuse(*names: object) -> Alignment:
+    def refuse(*names: object, **_: object) -> Alignment:
         compared.append(str(names[0]))
         return Alignment("older", "younger", np.zeros(3), "refused", 0.0, Reason.words("so"))
 
@@ -131,7 +131,7 @@ def test_however_many_components_there_are_few_are_compared_at_once_and_all_in_t
     """A robot that is lost again and again does not pay for each piece with every scan."""
     compared: list[str] = []
 
-    def refuse(*names: object) -> Alignment:
+    def refuse(*names: object, **_: object) -> Alignment:
         compared.append(str(names[0]))
         return Alignment("older", "younger", np.zeros(3), "refused", 0.0, Reason.words("so"))
 
@@ -199,8 +199,16 @@ def test_where_track_was_lost_less_proof_is_asked_for_than_anywhere(
     asked: list[tuple[bool, float, float]] = []
 
     def refuse(
-        a: str, _: object, b: str, __: object, p: FusionParameters, possible: object = None
+        a: str,
+        _: object,
+        b: str,
+        __: object,
+        p: FusionParameters,
+        possible: object = None,
+        *,
+        closely: bool = False,
     ) -> Alignment:
+        assert closely or possible is not None
         asked.append((possible is not None, p.decision.min_confidence, p.decision.min_lead))
         return Alignment(a, b, np.zeros(3), "ambiguous", 0.0, Reason.words("so"))
 
