@@ -16,7 +16,7 @@ _SENTENCES = {
     ReasonKind.SMALL_OTHER: "{other} has less than {min_wall:g} m of wall to compare",
     ReasonKind.NO_SHAPE: "no part of one has the shape of a part of the other",
     ReasonKind.LITTLE_COMMON: "only {common:.1f} m of wall in common",
-    ReasonKind.CONTRADICTED: "{common:.0f} m of wall in common, but {contradicted:.0f} m of wall"
+    ReasonKind.CONTRADICTED: "{common:.0f} m of wall in common, but {contradictory} m of wall"
     " where the other saw free space",
     ReasonKind.PARALLEL: "{match}; nearly all of it parallel, so one may slide along the other",
     ReasonKind.STRAIGHT: "{match}; but only straight walls, no shape that tells places apart",
@@ -34,9 +34,9 @@ _SENTENCES = {
     " upside down, or to turn the other way round, and nothing says so",
     ReasonKind.REBASED: "what was compared is in another component by now; to be compared again",
     ReasonKind.OTHERS_CONTRADICT: "{distance:.1f} m and {degrees:.0f}° off what {others}; {found}",
-    ReasonKind.MAPS_CONTRADICT: "{witnesses} would have {contradicted:.0f} m of wall where the"
+    ReasonKind.MAPS_CONTRADICT: "{witnesses} would have {contradictory} m of wall where the"
     " other saw free space, {common:.0f} m in common; {found}",
-    ReasonKind.MAPS_CONTRADICT_JOINTLY: "{witnesses} would have {contradicted:.0f} m of wall where"
+    ReasonKind.MAPS_CONTRADICT_JOINTLY: "{witnesses} would have {contradictory} m of wall where"
     " the other saw free space, {common:.0f} m in common, by this alignment or another one between"
     " them; {found}",
     ReasonKind.UNDECIDED: "contradicts others, and nothing tells for sure which is wrong; {found}",
@@ -86,6 +86,8 @@ def _words(cause: Reason, ends: Pair, by: Sequence[Pair]) -> dict[str, float | s
     words |= {"others": _tell_others(by), "witnesses": _tell_witnesses(by)}
     words |= {"next_best": "nothing else fits", "also": ""}
     if "contradicted" in numbers:
+        metres = numbers["contradicted"]
+        words["contradictory"] = f"{metres:.0f}" if metres >= 10 else f"{metres:.1f}"
         words["match"] = _MATCH.format(numbers["common"], numbers["contradicted"])
     if "confidence" in numbers:
         words["sure"] = percent(numbers["confidence"])

@@ -32,6 +32,8 @@ ELSE = "12 m of wall in common, 3.0 m contradicted"
         (Reason(ReasonKind.LITTLE_COMMON, {"common": 2.14}), "only 2.1 m of wall in common"),
         (Reason(ReasonKind.CONTRADICTED, {"common": 40.4, "contradicted": 12.3}),
          "40 m of wall in common, but 12 m of wall where the other saw free space"),
+        (Reason(ReasonKind.CONTRADICTED, {"common": 8.2, "contradicted": 0.46}),
+         "8 m of wall in common, but 0.5 m of wall where the other saw free space"),
         (Reason(ReasonKind.PARALLEL, MATCH),
          f"{FITS}; nearly all of it parallel, so one may slide along the other"),
         (Reason(ReasonKind.STRAIGHT, MATCH),
