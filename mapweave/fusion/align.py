@@ -269,21 +269,10 @@ def _decided(
         beyond = outside(*fields, best.transform, p.verification, p.rooms)
         one_room = beyond < p.rooms.min_outside
         sure *= p.rooms.unique if one_room else 1.0
-        alike = not one_room and _is_room(fields, best, rival, p)
         little = beyond if one_room else None
-        decision, cause = decide(best, rival, sure, p.decision, little, rival_is_room=alike)
+        decision, cause = decide(best, rival, sure, p.decision, little)
     other = None if rival is None else runner_up(best, rival)
     return Alignment(a, b, best.transform, decision, sure, cause, evidence(best), other)
-
-
-def _is_room(
-    fields: Fields, best: Hypothesis, rival: Hypothesis | None, p: FusionParameters
-) -> bool:
-    """Whether a rival that is near lays one room on another, and nothing else."""
-    if rival is None or rival.verdict.score <= p.decision.max_rival * best.verdict.score:
-        return False
-    told = outside(*fields, rival.transform, p.verification, p.rooms)
-    return told < p.rooms.min_outside
 
 
 def find_alignments(

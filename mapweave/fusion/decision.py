@@ -56,8 +56,7 @@ class DecisionParameters(StageParameters):
         0.8,
         gt=0,
         lt=1,
-        description="the same of a rival that would itself be contradicted, or that lays one room"
-        " on another alone: rooms are built alike, and what else the best explains, it does not",
+        description="the same of a rival that would itself be contradicted",
     )
     min_lead: float = Field(
         6.5,
@@ -97,13 +96,10 @@ def decide(
     sure: float,
     p: DecisionParameters,
     outside: float | None = None,
-    *,
-    rival_is_room: bool = False,
 ) -> tuple[Decision, Reason]:
     """Return the decision and its reason; `sure` is the confidence.
 
-    Where all that is shared lies within one room, `outside` is what little does not [m];
-    `rival_is_room` tells whether all does that the rival shares.
+    Where all that is shared lies within one room, `outside` is what little does not [m].
     """
     v = best.verdict
     match = {"common": v.common, "contradicted": v.contradicted}
@@ -115,7 +111,7 @@ def decide(
         return "ambiguous", Reason(ReasonKind.PARALLEL, match)
     if (best.complexity or 0.0) < p.min_complexity and v.held < p.plain_held:
         return "ambiguous", Reason(ReasonKind.STRAIGHT, match)
-    weak = rival is not None and (rival_is_room or rival.verdict.overlap < p.min_overlap)
+    weak = rival is not None and rival.verdict.overlap < p.min_overlap
     most = p.max_weak_rival if weak else p.max_rival
     if rival is not None and rival.verdict.score > most * v.score:
         return "ambiguous", Reason(ReasonKind.RIVAL, {**match, **_against(best, rival)})

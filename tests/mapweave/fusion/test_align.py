@@ -274,21 +274,20 @@ def test_the_best_leads_by_metres_and_by_its_share(
 
 
 @pytest.mark.parametrize(
-    ("score", "overlap", "is_room", "decision"),
+    ("score", "overlap", "decision"),
     [
-        (25.0, 0.99, False, "ambiguous"),
-        (25.0, 0.94, False, "accepted"),  # it would be refused itself
-        (25.0, 0.99, True, "accepted"),  # of its twin room only
-        (33.0, 0.94, True, "ambiguous"),
+        (25.0, 0.99, "ambiguous"),
+        (25.0, 0.94, "accepted"),  # it would be refused itself
+        (33.0, 0.94, "ambiguous"),
     ],
 )
 def test_a_rival_that_could_not_be_accepted_has_to_be_nearer(
-    score: float, overlap: float, decision: str, *, is_room: bool
+    score: float, overlap: float, decision: str
 ) -> None:
     best = Hypothesis(np.zeros(3), np.zeros(2), Verdict(40.0, 0.0, 1.0, 0.02, 9.0, 5.0), 0.5)
     verdict = Verdict(score, 0.0, overlap, 0.02, 9.0, 5.0)
     rival = Hypothesis(np.array([9.0, 0, 0]), np.array([9.0, 0]), verdict, 0.5)
-    found, _ = decide(best, rival, 0.95, DecisionParameters(), rival_is_room=is_room)
+    found, _ = decide(best, rival, 0.95, DecisionParameters())
     assert found == decision
 
 

@@ -55,6 +55,16 @@ def test_two_rooms_that_look_alike_are_not_joined_by_what_lies_inside() -> None:
     assert found.decision != "accepted" and found.confidence < 0.85
 
 
+@pytest.mark.parametrize("second", ["room202.log.gz", "room202-inside-only.log.gz"])
+def test_two_rooms_that_look_alike_are_not_joined_by_a_corridor_that_looks_alike_as_well(
+    second: str,
+) -> None:
+    (found,) = align(map_of("twin_rooms", "room201.log.gz", "a"), map_of("twin_rooms", second, "b"))
+    if found.decision == "accepted":  # they are across the corridor from each other, half a turn
+        assert abs(found.transform[2]) == pytest.approx(np.pi, abs=0.1)
+        assert np.hypot(*found.transform[:2]) == pytest.approx(13, abs=0.5)
+
+
 def furnished(rng: Generator, partitions: FloatArray = NONE) -> LineMap:
     """Return a building with boxes of up to 1 m anywhere in it, and (k, 4) `partitions`."""
     building = shapely.Polygon(BUILDING)
