@@ -7,6 +7,7 @@ import time
 from typing import Protocol
 
 from benchmarks import (
+    day,
     endurance,
     figure2,
     fit_confidence,
@@ -69,6 +70,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "subscribers": subscribers,
     "crowd": crowd,
     "page": page,
+    "day": day,
     "mutations": mutations,
 }
 USUAL = ("figure2", "map", "kidnap", "localize", "fusion")

@@ -56,6 +56,10 @@ class Usage:
         for name, group in groups.items():
             self.seen.setdefault(name, []).append((now, *taken.get(group, (0, 0.0))))
 
+    def note(self, name: str, memory: int) -> None:
+        """Note what something takes now [bytes] that is no process of its own."""
+        self.seen.setdefault(name, []).append((time.monotonic(), memory, 0.0))
+
     def figures(self) -> list[Figures]:
         """Return what each took in the second half of the time."""
         return [_figures(name, seen) for name, seen in self.seen.items() if len(seen) > 1]
