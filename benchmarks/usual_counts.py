@@ -14,11 +14,11 @@ from pathlib import Path
 from benchmarks.logs import find_logs
 from benchmarks.tables import format_table
 from mapweave.io.readers import read_scans
+from mapweave.kernels.range_coder import Beginning, PythonEncoder, name_of
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave_protocol.wire.coding import entropy
-from mapweave_protocol.wire.coding.entropy import Beginning, Encoder, name_of
 from mapweave_protocol.wire.coding.trajectory_code import Clock
 from mapweave_protocol.wire.geometry import ANOTHER, PackedLines, PackedSubmap
 from mapweave_protocol.wire.map_message import Changes, Place
@@ -30,15 +30,15 @@ WEIGHT = 24  # seen decisions that a beginning counts for: what a map is like so
 SEEN = 8  # times at least that a context came up
 
 
-class Tally(Encoder):
+class Tally(PythonEncoder):
     """An encoder that remembers how often each decision came out in each context."""
 
     def __init__(self, beginning: Beginning | None = None) -> None:
-        super().__init__(beginning)
+        super().__init__(entropy.usual() if beginning is None else beginning, entropy.MAX_NUMBERS)
         self.tally: Counter[tuple[str, int]] = Counter()
 
     def bit(self, context: Hashable, value: int = 0) -> int:
-        """Code and count a decision; see `Encoder`."""
+        """Code and count a decision; see `Coder`."""
         self.tally[name_of(context), value] += 1
         return super().bit(context, value)
 
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> None:
     rows = []
     for name, robot_map in maps.items():
         others = (counted for other, counted in tallies.items() if other != name)
-        usual = Encoder(), Tally(counts(*others))
+        usual = Tally(), Tally(counts(*others))
         rows.append([name, *(str(len(_coded(encoder, robot_map))) for encoder in usual)])
     print(format_table(["log", "bytes", "with counts of the other logs"], rows))
     if options.write:
@@ -99,7 +99,7 @@ def told(usual: Beginning) -> str:
     return "".join(f"{name} {zeros} {ones}\n" for name, (zeros, ones) in sorted(usual.items()))
 
 
-def _coded(encoder: Encoder, robot_map: RobotMap) -> bytes:
+def _coded(encoder: PythonEncoder, robot_map: RobotMap) -> bytes:
     """Return the stream of a whole map."""
     clock = Clock()
     for submap in robot_map.submaps:

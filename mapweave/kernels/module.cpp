@@ -16,6 +16,7 @@
 #include "polylines.hpp"
 #include "pose_evidence.hpp"
 #include "proposals.hpp"
+#include "range_coder.hpp"
 #include "raster_icp.hpp"
 #include "rasters.hpp"
 #include "scores.hpp"
@@ -44,6 +45,7 @@ NB_MODULE(_compiled, m) {
   bind_polygons(m);
   bind_polylines(m);
   bind_proposals(m);
+  bind_range_coder(m);
   bind_raster_icp(m);
   bind_rasters(m);
   bind_scores(m);

@@ -10,9 +10,10 @@ import numpy as np
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.geometry.segments import lengths
+from mapweave.kernels.range_coder import Coder, Encoder
 from mapweave.maps import LineMap, Submap
+from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.coding.changes import code_changed_free_space, code_changed_lines
-from mapweave_protocol.wire.coding.entropy import Coder, Decoder, Encoder
 from mapweave_protocol.wire.coding.free_space_code import CodedFreeSpace, code_free_space
 from mapweave_protocol.wire.coding.line_code import CodedLines, code_lines, main_turn
 from mapweave_protocol.wire.coding.trajectory_code import Clock, CodedTrajectory, code_trajectory
@@ -165,7 +166,7 @@ class PackedSubmap:
         return Submap(self.id, 0, np.zeros(3), lines, self.trajectory.restore(SUBMAP_REACH))
 
 
-def decode_submaps(decoder: Decoder) -> Iterator[PackedSubmap]:
+def decode_submaps(decoder: Coder) -> Iterator[PackedSubmap]:
     """Yield the submaps that `SubmapStream` encoded.
 
     Raises
@@ -207,7 +208,7 @@ class SubmapStream:
         )
         stages = {k: stage for k, stage in self._stages.items() if k <= same}
         begin = max(stages, default=0)
-        encoder, clock = stages.get(begin, (Encoder(), Clock()))
+        encoder, clock = stages.get(begin, (entropy.encoder(), Clock()))
         encoder, clock = encoder.copy(), replace(clock)
         for number, packed in enumerate(submaps[begin:], start=begin + 1):
             encoder.bit(ANOTHER, 1)

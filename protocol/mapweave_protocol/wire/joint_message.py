@@ -11,7 +11,7 @@ from mapweave.maps import JointComponent, JointMap
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.alignment_message import WireAlignment
 from mapweave_protocol.wire.budget import MIB, Budget
-from mapweave_protocol.wire.coding.entropy import Decoder, Encoder
+from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.coding.line_code import CERTAINTIES
 from mapweave_protocol.wire.geometry import MAX_BYTES, PackedLines
 from mapweave_protocol.wire.model import (
@@ -68,7 +68,7 @@ class WireComponent(WireModel):
         marks: tuple[WirePlacedMark, ...],
     ) -> Self:
         """Return the component of these lines, whole."""
-        encoder = Encoder()
+        encoder = entropy.encoder()
         PackedLines.code(encoder, lines, confident=True)
         return cls(robots=robots, confidence=confidence, stream=encoder.finish(), marks=marks)
 
@@ -83,11 +83,11 @@ class WireComponent(WireModel):
         """What `stream` says, if that is all there is."""
         if self.before is not None:
             raise ValueError("what changed of a component, expected all of it")
-        return PackedLines.code(Decoder(self.stream), None, confident=True)
+        return PackedLines.code(entropy.decoder(self.stream), None, confident=True)
 
     def since(self, name: str, before: Self) -> Self:
         """Return what makes the component `before`, which holds `name`, this one."""
-        encoder = Encoder()
+        encoder = entropy.encoder()
         PackedLines.code_changes(encoder, before.lines, self.lines)
         return self.model_copy(update={"stream": encoder.finish(), "before": name})
 
@@ -99,7 +99,7 @@ class WireComponent(WireModel):
         ValueError
             If its stream is damaged.
         """
-        lines = PackedLines.code_changes(Decoder(self.stream), before.lines, None)
+        lines = PackedLines.code_changes(entropy.decoder(self.stream), before.lines, None)
         return self.of_lines(self.robots, self.confidence, lines, self.marks)
 
     def unpack(self) -> JointComponent:

@@ -10,11 +10,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.range_coder import Coder, Encoder
 from mapweave.maps import RobotMap, Submap
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire import packing
 from mapweave_protocol.wire.budget import MIB, Budget
-from mapweave_protocol.wire.coding.entropy import Coder, Decoder, Encoder
+from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.geometry import (
     DIGEST_SIZE,
     MAX_BYTES,
@@ -116,7 +117,7 @@ class Changes:
         ValueError
             If there is too much of anything.
         """
-        decoder = Decoder(data)
+        decoder = entropy.decoder(data)
         submaps = tuple(decode_submaps(decoder))
         return cls(_code_gone(decoder, ()), _code_places(decoder, ()), submaps)
 

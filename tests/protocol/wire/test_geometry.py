@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 import shapely.affinity
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Polygon, box
 from shapely.ops import unary_union
@@ -84,6 +84,7 @@ PILLARS = [box(x, 0.0, x + 0.9, 1.0) for x in (-2.0, 0.0, 2.0)]
 
 
 @given(turn=st.floats(-3.0, 3.0), pillars=st.integers(0, 3))
+@example(turn=2.6120673646328445, pillars=2)  # a pillar was filled
 @settings(max_examples=40, deadline=None)
 def test_free_space_arrives_within_what_margin_and_clearance_leave(
     turn: float, pillars: int

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from typing import TypeAlias, TypeVar
 
+from mapweave.kernels.range_coder import Coder
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.coding.entropy import Coder
 from mapweave_protocol.wire.coding.free_space_code import CodedFreeSpace, code_free_space
 from mapweave_protocol.wire.coding.line_code import CodedLines, code_lines, rows_of
 

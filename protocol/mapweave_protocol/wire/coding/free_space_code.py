@@ -12,8 +12,8 @@ from typing import TypeAlias
 import numpy as np
 
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.kernels.range_coder import Coder
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.coding.entropy import Coder
 from mapweave_protocol.wire.coding.line_code import code_quarter, turned, turned_back
 
 PER_METRE = 4  # a step of 0.25 m: no corner moves by more than 0.18 m

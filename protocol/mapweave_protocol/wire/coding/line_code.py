@@ -14,9 +14,9 @@ from typing import TypeAlias
 import numpy as np
 
 from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.kernels.range_coder import Coder
 from mapweave.maps import LineMap
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.coding.entropy import Coder
 
 PER_METRE = 73  # a step of 13.7 mm: no point moves by more than 9.7 mm
 TURNS = 512  # directions of the frame told apart, in a quarter turn

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapweave.geometry.arrays import IntArray
+from mapweave.kernels.range_coder import Coder
 from mapweave.maps import Trajectory
 from mapweave_protocol.wire import packing
-from mapweave_protocol.wire.coding.entropy import Coder
 from mapweave_protocol.wire.coding.line_code import turned_back
 
 PER_METRE = 36  # a step of 28 mm: no scan moves by more than 20 mm
