@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -256,7 +256,11 @@ def differences(quiet: Result, disturbed: Result) -> Iterator[str]:
         yield from _off(name, se2.compose(frames[frame][1], poses), true)
     parts = {frame for _, frame, _ in quiet.places()}
     if len(frames) > len(parts):
-        yield f"joint components: {sorted(frames)}, undisturbed {sorted(parts)}"
+        sizes = Counter[str]()
+        for _, frame, scans in disturbed.places():
+            sizes[frame] += len(scans)
+        told = ", ".join(f"{frame} of {size} scans" for frame, size in sizes.most_common())
+        yield f"joint components: {told}; undisturbed {sorted(parts)}"
     lost = truth.keys() - seen
     if lost:
         yield f"scans lost: {len(lost)} of {len(truth)}, such as {sorted(lost)[:5]}"
