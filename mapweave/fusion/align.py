@@ -22,6 +22,7 @@ from mapweave.fusion.mirrored import mirrored, told_if_mirrored
 from mapweave.fusion.parameters import FusionParameters, chosen
 from mapweave.fusion.places import compare_at_places, located
 from mapweave.fusion.rooms import outside
+from mapweave.fusion.wings import told_by_kind
 from mapweave.geometry import se2
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
@@ -132,6 +133,26 @@ def _is_rigid(whole: Alignment, a: PreparedMap, b: PreparedMap, p: FusionParamet
     return whole.confidence * holds(far, p.reach) >= p.decision.min_confidence
 
 
+def _told_apart(
+    found: Alignment, a: PreparedMap, b: PreparedMap, p: FusionParameters
+) -> Alignment:
+    """Return `found`, ambiguous where the two maps tell a kind of place, not which one it is."""
+    if found.decision == "refused" or found.evidence.is_empty:
+        return found
+    if not told_by_kind(a, b, found.transform, p.verification, p.wings):
+        return found
+    sure = found.confidence * p.rooms.unique
+    if found.decision == "ambiguous":
+        return replace(found, confidence=sure)
+    numbers = {
+        "common": found.evidence.common or 0.0,
+        "contradicted": found.evidence.contradicted or 0.0,
+        "confidence": sure,
+    }
+    cause = Reason(ReasonKind.ONE_KIND, numbers)
+    return replace(found, decision="ambiguous", confidence=sure, cause=cause)
+
+
 def _at_place(
     found: Alignment, a: PreparedMap | None, b: PreparedMap | None, p: FusionParameters
 ) -> Alignment:
@@ -142,6 +163,7 @@ def _at_place(
     """
     if a is None or b is None or found.decision == "refused" or found.evidence.is_empty:
         return found
+    found = _told_apart(found, a, b, p)
     far = reach(a.raster, b.raster, found.transform, p.verification)
     place = found.confidence if found.decision == "accepted" else None
     return replace(found, evidence=replace(found.evidence, reach=far, place=place))
