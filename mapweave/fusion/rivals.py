@@ -24,8 +24,8 @@ def without_its_room(
 ) -> Hypothesis | None:
     """Return `rival` as it counts: a twin of one room by what it has outside of that alone.
 
-    It counts in full unless the best, one room left out, has a good part of what it has, and no
-    door of one map is a wall of the other.
+    It counts in full unless the best, one room left out, has a good part of what it has, next to
+    nothing contradicts the best, and no door of one map is a wall of the other.
 
     Parameters
     ----------
@@ -34,7 +34,9 @@ def without_its_room(
     fields
         Of the reference, and of the other map.
     """
-    if rival is None or min(beyond, best.verdict.score) < p.of_rival * rival.verdict.score:
+    if rival is None or best.verdict.overlap < p.clean:
+        return rival
+    if min(beyond, best.verdict.score) < p.of_rival * rival.verdict.score:
         return rival
     little = outside(*fields, rival.transform, verification, p)
     if little >= p.min_outside:

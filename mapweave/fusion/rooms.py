@@ -53,6 +53,9 @@ class RoomParameters(BaseModel):
         " has, from which a rival of one room is its twin: two thirds and more in generated"
         " buildings, a third where the rival is the right one",
     )
+    clean: float = Field(
+        0.99, gt=0, le=1, description="share in common of the best, at least, for that"
+    )
     unique: float = Field(
         0.8, gt=0, le=1, description="probability that a room has no twin within reach of the team"
     )

@@ -1,4 +1,4 @@
-"""Maps that are nearly the same, and bare, tell a kind of place; odd things and doors tell which."""
+"""Maps nearly the same, and bare, tell a kind of place; odd things and doors tell which one."""
 
 import numpy as np
 import pytest
