@@ -23,6 +23,7 @@ class ReasonKind(StrEnum):
     STRAIGHT = "straight"  # no shape that tells places apart
     RIVAL = "rival"  # fits as well
     ONE_ROOM = "one_room"  # all that is shared lies in one room, which may exist twice
+    ONE_KIND = "one_kind"  # two maps, nearly the same and bare: of one place, or of two built alike
     UNSURE = "unsure"
     CONVINCING = "convincing"
 
@@ -56,6 +57,7 @@ _NUMBERS: dict[ReasonKind, tuple[str, ...]] = {
     ReasonKind.STRAIGHT: _MATCH,
     ReasonKind.RIVAL: (*_MATCH, *_RIVAL),
     ReasonKind.ONE_ROOM: (*_MATCH, "outside", "confidence"),
+    ReasonKind.ONE_KIND: (*_MATCH, "confidence"),
     ReasonKind.UNSURE: (*_MATCH, "confidence"),
     ReasonKind.CONVINCING: _MATCH,
     ReasonKind.PARTS_AGREE: ("parts", "spread"),

@@ -22,6 +22,7 @@ NEEDED: dict[ReasonKind, list[list[str]]] = {
     ReasonKind.STRAIGHT: [MATCH],
     ReasonKind.RIVAL: [MATCH + RIVAL],
     ReasonKind.ONE_ROOM: [[*MATCH, "outside", "confidence"]],
+    ReasonKind.ONE_KIND: [[*MATCH, "confidence"]],
     ReasonKind.UNSURE: [[*MATCH, "confidence"], [*MATCH, "confidence", *RIVAL]],
     ReasonKind.CONVINCING: [MATCH, MATCH + RIVAL],
     ReasonKind.REBASED: [[]],

@@ -3,8 +3,7 @@
 In the order of the paper: hypothesise (H1, H2: by shape, corners and parallel walls, all at once),
 align (V1), verify (V2: by all that both maps saw, free space included), decide. The loop as it is
 printed is `mapweave.fusion.reference`; docs/paper.md says what was changed and why. Where whole
-maps cannot be joined they are compared about places: maps may be bent. So an alignment is right
-where both looked, and says where that is.
+maps cannot be joined they are compared about places: maps may be bent.
 """
 
 import itertools
@@ -21,7 +20,9 @@ from mapweave.fusion.extrapolation import holds, reach
 from mapweave.fusion.mirrored import mirrored, told_if_mirrored
 from mapweave.fusion.parameters import FusionParameters, chosen
 from mapweave.fusion.places import compare_at_places, located
+from mapweave.fusion.rivals import without_its_room
 from mapweave.fusion.rooms import outside
+from mapweave.fusion.wings import unless_one_kind
 from mapweave.geometry import se2
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
@@ -95,8 +96,7 @@ def align(
 def _align(first: Component, second: Component, p: FusionParameters) -> Alignment:
     """Compare two components; at places, where as wholes they cannot be joined: they may be bent.
 
-    Where they may be bent by more than the tolerance, what fits as wholes may be a look-alike: then
-    places must agree as well.
+    What fits as wholes that may be bent may be a look-alike: then places must agree as well.
     """
     ours, theirs = first.whole, second.whole
     if ours is None or theirs is None:
@@ -112,7 +112,8 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
         p.places,
         lambda a, b: compare(first.name, a.shape, second.name, b.shape, p),
     )
-    return _at_place(found or whole, ours.shape, theirs.shape, p)
+    best = found or whole
+    return _at_place(best, ours.shape, theirs.shape, p, whole=best is whole)
 
 
 def _mirrored(first: Component, second: Component, p: FusionParameters) -> Alignment | None:
@@ -133,15 +134,21 @@ def _is_rigid(whole: Alignment, a: PreparedMap, b: PreparedMap, p: FusionParamet
 
 
 def _at_place(
-    found: Alignment, a: PreparedMap | None, b: PreparedMap | None, p: FusionParameters
+    found: Alignment,
+    a: PreparedMap | None,
+    b: PreparedMap | None,
+    p: FusionParameters,
+    *,
+    whole: bool = True,
 ) -> Alignment:
     """Return `found` with how far the maps go on from there: what is off beyond is others' matter.
 
     Where the place was proven, its evidence tells how sure that is. What is refused is asked no
-    further.
+    further. `whole`: it is of the maps as wholes.
     """
     if a is None or b is None or found.decision == "refused" or found.evidence.is_empty:
         return found
+    found = unless_one_kind(found, a, b, p.verification, p.wings, rigid=whole)
     far = reach(a.raster, b.raster, found.transform, p.verification)
     place = found.confidence if found.decision == "accepted" else None
     return replace(found, evidence=replace(found.evidence, reach=far, place=place))
@@ -242,8 +249,7 @@ def _by_walls(
 ) -> tuple[Alignment | None, FloatArray]:
     """Return the alignment that parallel walls alone prove, if any; what they propose (n, 3).
 
-    It is convincing as it stands, its rivals among what was proposed: shapes need not be looked
-    for. Where cells tell already that it will not be, it is not tried.
+    Its rivals are among what was proposed. Not tried where cells tell that none will convince.
     """
     shifted, scores = propose_by_walls(first, second, p.hypotheses, p.verification)
     middle = second.raster.oriented.points.mean(axis=0)
@@ -268,9 +274,14 @@ def _decided(
     if decision != "refused":  # whichever room it is
         beyond = outside(*fields, best.transform, p.verification, p.rooms)
         one_room = beyond < p.rooms.min_outside
+        asked = p.verification, p.rooms, p.wings.crossings
+        counted = without_its_room(best, rival, beyond, fields, *asked)
+        sure = confidence(best.verdict, counted.verdict if counted else None, p.confidence)
         sure *= p.rooms.unique if one_room else 1.0
         little = beyond if one_room else None
-        decision, cause = decide(best, rival, sure, p.decision, little)
+        decision, cause = decide(best, counted, sure, p.decision, little)
+    if decision == "refused" or cause.kind is ReasonKind.RIVAL:
+        sure = min(sure, p.rooms.unique)
     other = None if rival is None else runner_up(best, rival)
     return Alignment(a, b, best.transform, decision, sure, cause, evidence(best), other)
 

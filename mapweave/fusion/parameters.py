@@ -8,6 +8,7 @@ from mapweave.fusion.decision import DecisionParameters
 from mapweave.fusion.extrapolation import ExtrapolationParameters
 from mapweave.fusion.places import PlaceParameters
 from mapweave.fusion.rooms import RoomParameters
+from mapweave.fusion.wings import WingParameters
 from mapweave.geometry.arguments import check_kind
 from mapweave.matching.distance_field import DistanceFieldParameters
 from mapweave.matching.hypotheses import HypothesisParameters
@@ -38,6 +39,7 @@ class FusionParameters(StageParameters):
     loose: float = Field(0.5, gt=0, description="[m] a hypothesis may be off, before alignment")
     confidence: ConfidenceParameters = ConfidenceParameters()
     rooms: RoomParameters = RoomParameters()
+    wings: WingParameters = WingParameters()
     places: PlaceParameters = derived(
         lambda c: PlaceParameters.of(
             c, verification=VerificationParameters.of(c, contradiction_weight=5.0, moved_weight=0.1)

@@ -46,6 +46,16 @@ class RoomParameters(BaseModel):
         description="metres that count for each that holds the weakest direction: a plain corridor"
         " before a room is as common as the room, and does not tell where along it that is",
     )
+    of_rival: float = Field(
+        0.5,
+        gt=0,
+        description="wall that the best has outside of one room, as a share of all that a rival"
+        " has, from which a rival of one room is its twin: two thirds and more in generated"
+        " buildings, a third where the rival is the right one",
+    )
+    clean: float = Field(
+        0.99, gt=0, le=1, description="share in common of the best, at least, for that"
+    )
     unique: float = Field(
         0.8, gt=0, le=1, description="probability that a room has no twin within reach of the team"
     )

@@ -84,7 +84,7 @@ def test_a_map_without_scans_holds_marks_by_its_submaps() -> None:
 def test_a_mark_is_at_its_place_in_the_joint_map() -> None:
     rng = np.random.default_rng(8)
     one = robot_map(rng, "a", ((0.0, 12.0), (10.0, 20.0)), (0, 0))
-    two = marked(robot_map(rng, "b", ((2.0, 14.0), (12.0, 22.0)), (0, 0)), 0, PLACE)
+    two = marked(robot_map(rng, "b", ((4.0, 16.0), (14.0, 26.0)), (0, 0)), 0, PLACE)
     joint = fuse([one, two])
     [component] = joint.components
     [mark] = component.marks
