@@ -127,7 +127,8 @@ def config_of(options: argparse.Namespace) -> "Config":
 
 def _overview(points: Sequence[str]) -> str:
     commands = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
-    lines = [f"  {name:<8} {summary_of(commands[name])}" for name in points]
+    width = max(map(len, points))
+    lines = [f"  {name:<{width}}  {summary_of(commands[name])}" for name in points]
     return "usage: mapweave COMMAND …\n\n" + "\n".join(
         [
             "Joint line maps of robot teams from raw 2D laser scans.",

@@ -36,6 +36,7 @@ PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(enco
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 MAKE_TARGET = re.compile(r"^make ([a-z-]+)")
 BENCHMARK = re.compile(r"python -m benchmarks ([a-z][\w-]*)")
+FOR_DEVELOPERS = {"fuzz", "docs", "peers", "test", "dev"}  # extras
 TABLED: dict[str, type[BaseModel]] = {
     "MAP.json": MapFile,
     "submaps[]": SubmapFile,
@@ -113,6 +114,12 @@ def parser_of(name: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=f"mapweave {name}")
     command.configure(parser)
     return parser
+
+
+def test_every_extra_that_does_something_for_a_user_is_in_the_readme() -> None:
+    known = set(PROJECT["project"]["optional-dependencies"]) - FOR_DEVELOPERS
+    install = next(line for line in README.text.splitlines() if "pip install '.[" in line)
+    assert set(re.findall(r"[a-z0-9]+", install.partition("pip install '.[")[2])) >= known
 
 
 @pytest.mark.parametrize("line", mapweave_lines())

@@ -36,6 +36,8 @@ from mapweave_protocol.link.arguments import (
     connection_of,
     tell_waiting,
 )
+from mapweave_protocol.link.security.membership import check_member
+from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
@@ -128,6 +130,7 @@ def _run(options: argparse.Namespace) -> int:
     robot = check_id("robot", options.robot)
     begin_log(options, robot)
     team, endpoints, link = connection_of(options)
+    check_member(link, Member(team, Role.ROBOT, robot))
     config = config_of(options)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
     source = open_source(options.source, _read_options(options, config, endpoints))

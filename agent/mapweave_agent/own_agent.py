@@ -27,6 +27,9 @@ from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_agent.stored.mappers import mapper_of
 from mapweave_agent.taking_up import RESUME_WITHIN, EarlierRuns
 from mapweave_protocol.link.arguments import DEFAULT_TEAM
+from mapweave_protocol.link.security.membership import check_member
+from mapweave_protocol.link.security.roster import Member, Role
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.subscriber import joint_maps, poses
 from mapweave_protocol.wire.keys import new_boot
@@ -227,9 +230,13 @@ class Agent:
             self._check_running()
 
     def _open(self, stack: ExitStack) -> AgentRun:
+        link = LinkSettings.of_environment()
+        check_member(link, Member(self._team, Role.ROBOT, self._robot))
         earlier = EarlierRuns.of(self._team, self._robot, self._state)
         compare = partial(align, parameters=FusionParameters.of(self._config))
-        session = stack.enter_context(open_session(self._endpoints, patience=self._patience))
+        session = stack.enter_context(
+            open_session(self._endpoints, patience=self._patience, link=link)
+        )
         comparer = stack.enter_context(ComparisonWorker(compare))
         mapper = stack.enter_context(
             mapper_of(self._start, self._robot, new_boot(), self._config, live=True)

@@ -38,6 +38,8 @@ from mapweave_protocol.link.arguments import (
     connection_of,
     tell_waiting,
 )
+from mapweave_protocol.link.security.membership import check_member
+from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
@@ -94,6 +96,7 @@ def _add_retention_arguments(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     begin_log(options, "coordinator")
     team, endpoints, link = connection_of(options)
+    check_member(link, Member(team, Role.COORDINATOR, Role.COORDINATOR.value))
     config = config_of(options)
     page = None if options.http is None else with_keys(options.http, link.keys)
     parameters = CoordinatorParameters(min_interval=options.min_interval)

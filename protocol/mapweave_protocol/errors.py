@@ -1,5 +1,7 @@
 """What can go wrong on the wire, as exceptions that carry data."""
 
+from pathlib import Path
+
 from mapweave.errors import MapweaveError
 
 
@@ -50,6 +52,16 @@ class NotEncryptedError(EndpointError):
             " tls/localhost:7447",
         )
         self.endpoints = endpoints
+
+
+class WrongKeysError(MapweaveError):
+    """Keys of another member than the program that uses them."""
+
+    def __init__(self, folder: Path, whose: str, expected: str) -> None:
+        super().__init__(f"{folder}: keys of {whose}; expected those of {expected}")
+        self.folder = folder
+        self.whose = whose
+        self.expected = expected
 
 
 class UnreachableError(MapweaveError):

@@ -99,7 +99,7 @@ class Messages:
     def markers(
         self,
         lines: Sequence[Lines],
-        labels: Sequence[str],
+        labels: Sequence[tuple[str, str]],
         marks: Sequence[PlacedMark],
         frame: str,
         stamp: float,
@@ -111,15 +111,15 @@ class Messages:
         lines
             In `frame`.
         labels
-            Robots, each shown by name where its own frame ``<robot>/base_link`` is.
+            Robots and their frames, where each is shown by name.
         marks
             In `frame`, each shown by its label.
         """
         header = self._header(frame, stamp)
         markers = [self._marker(header, "", 0, LINES, action=CLEAR)]
         markers += [self._line_list(header, number, one) for number, one in enumerate(lines)]
-        for number, robot in enumerate(labels):
-            there = self._header(base_frame(robot), 0.0)  # wherever that is
+        for number, (robot, own) in enumerate(labels):
+            there = self._header(own, 0.0)  # wherever that is
             marker = self._marker(there, "robots", number, TEXT, text=robot, frame_locked=True)
             markers.append(marker)
         for number, mark in enumerate(marks):
@@ -247,5 +247,10 @@ def map_frame(robot: str) -> str:
 
 
 def base_frame(robot: str) -> str:
-    """Return the name of the frame of a robot."""
+    """Return the name of the frame of a robot that has none of its own."""
     return f"{robot}/base_link"
+
+
+def sensor_frame(robot: str) -> str:
+    """Return the name of the frame of what a robot's scans are taken with."""
+    return f"{robot}/sensor"

@@ -12,16 +12,15 @@ from typing import Self
 
 import zenoh
 
-from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.messages import PoseMessage
-from mapweave_ros.messages import Messages
+from mapweave_ros.messages import Messages, map_frame
 from mapweave_ros.network import Ros2Network
 from mapweave_ros.node import Node
+from mapweave_ros.robot.frames import RobotFrames
 from mapweave_ros.speaker import Speaker, joint_topics, robot_topics, topic_name
 
 Told = RobotMap | JointMap | PoseMessage
@@ -40,7 +39,7 @@ class Ros2Output:
         The node's.
     topics
         As of `Node`.
-    mounting
+    frames
         As of `Speaker`.
 
     Raises
@@ -54,13 +53,13 @@ class Ros2Output:
         network: Ros2Network,
         name: str,
         topics: Mapping[str, tuple[str, bool]],
-        mounting: FloatArray = se2.IDENTITY,
+        frames: RobotFrames | None = None,
     ) -> None:
         Messages()  # so that what is missing is said at once
         self._network = network
         self._name = name
         self._topics = topics
-        self._mounting = mounting
+        self._frames = frames
         self._news: dict[str, Told] = {}
         self._changed = threading.Condition()
         self._closed = False
@@ -68,10 +67,12 @@ class Ros2Output:
 
     @classmethod
     def of_robot(
-        cls, network: Ros2Network, robot: str, mounting: FloatArray = se2.IDENTITY
+        cls, network: Ros2Network, robot: str, frames: RobotFrames | None = None
     ) -> "Ros2Output":
-        """Return the output of an agent."""
-        return cls(network, f"mapweave_{topic_name(robot)}", robot_topics(robot), mounting)
+        """Return the output of an agent; `frames` are the robot's, followed from now on."""
+        known = RobotFrames() if frames is None else frames
+        known.follow(map_frame(robot))
+        return cls(network, f"mapweave_{topic_name(robot)}", robot_topics(robot), known)
 
     @classmethod
     def of_team(cls, network: Ros2Network, team: str) -> "Ros2Output":
@@ -107,7 +108,7 @@ class Ros2Output:
             if session is None:
                 return
             node = stack.enter_context(Node(session, self._network, self._name, self._topics))
-            speaker = Speaker(node, self._mounting)
+            speaker = Speaker(node, self._frames)
             while (news := self._next()) is not None:
                 if isinstance(news, PoseMessage):
                     speaker.pose(news)

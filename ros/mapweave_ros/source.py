@@ -5,10 +5,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
-import numpy as np
 import zenoh
 
-from mapweave.geometry.arrays import FloatArray
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags.frames import TF_STATIC
 from mapweave.io.readers.ros_bags.laser_messages import UnreadableMessageError
@@ -16,12 +14,13 @@ from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
 from mapweave_protocol.link.inbox import Arrival, Inbox
 from mapweave_ros.address import Laser, Ros2Address
-from mapweave_ros.beside_scans import BesideScans
 from mapweave_ros.graph import topics_of_type
 from mapweave_ros.output import open_when_there
 from mapweave_ros.refusals import Refusals
+from mapweave_ros.robot.beside_scans import BesideScans
+from mapweave_ros.robot.frames import RobotFrames
+from mapweave_ros.robot.several_lasers import SeveralLasers
 from mapweave_ros.scan_messages import ScanMessages
-from mapweave_ros.several_lasers import SeveralLasers
 from mapweave_ros.topics import DDS_LASER_SCAN, TopicKeys
 
 POLL = 0.1  # [s] after which it is noticed that nobody wants any more
@@ -72,16 +71,7 @@ class Ros2Source:
         self._tell = on_warning
         self._messages = ScanMessages()
         self._closed = threading.Event()
-
-    @property
-    def mounting(self) -> FloatArray:
-        """(3,) where the robot's scans are taken from, on the robot [m, m, rad].
-
-        A single laser is turned as the robot is; scans of several are from its middle.
-        """
-        mounting = self._lasers[0].mounting
-        alone = len(self._lasers) == 1 and mounting is not None
-        return np.array([mounting.x, mounting.y, 0.0]) if alone and mounting else np.zeros(3)
+        self.frames = RobotFrames()
 
     def count(self) -> None:
         """Nobody knows."""
@@ -99,7 +89,7 @@ class Ros2Source:
                 return
             domain = self._address.network.domain
             topics = [_Topic(laser, domain, self._tell) for laser in self._lasers]
-            beside = BesideScans(self._messages, domain, self._odometry, self._tell)
+            beside = BesideScans(self._messages, domain, self.frames, self._odometry, self._tell)
             beside.subscribe(session, inbox.put, stack)
             self._hear_transforms(inbox, beside)
             for key in (key for topic in topics for key in topic.keys):
@@ -142,10 +132,20 @@ class Ros2Source:
             if found is None:
                 continue
             silent_at = float("inf")
-            mounting = topic.mounting(found[0], beside, alone=len(topics) == 1)
+            mounting = self._mounting(topic, found[0], beside)
             if mounting is not None:
                 scans += 1
                 yield topic.laser.topic, mounting, found[1]
+
+    def _mounting(self, topic: "_Topic", frame: str, beside: BesideScans) -> Mounting | None:
+        """Return where a laser sits, as of `_Topic.mounting`; note the first one's frame."""
+        alone = len(self._lasers) == 1
+        mounting = topic.mounting(frame, beside, alone=alone)
+        if mounting is not None and topic.laser == self._lasers[0]:
+            # Scans of several lasers are seen from the middle of the robot.
+            seen_from = mounting if alone else Mounting()
+            self.frames.laser_sits(frame, seen_from, known=topic.is_known or not alone)
+        return mounting
 
     def _combined(
         self, heard: Iterator[tuple[str, Mounting, Scan]], beside: BesideScans
@@ -179,6 +179,8 @@ class _Topic:
         self._refusals = Refusals(laser.topic, tell)
         self._key = ""
         self._mounting: Mounting | None = None
+        self.is_known = False
+        """Whether somebody said where it sits."""
         self._heard = 0.0
 
     @property
@@ -198,6 +200,7 @@ class _Topic:
         """
         if self._mounting is None:
             self._mounting = self.laser.mounting or beside.mounting(self.laser.topic, frame)
+            self.is_known = self._mounting is not None
         if self._mounting is None and alone:
             self._mounting = Mounting()
         if self._mounting is None:

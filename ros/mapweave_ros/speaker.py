@@ -1,7 +1,8 @@
 """What ROS 2 is told of maps and poses: grids, walls, and where everything is.
 
 Frames: ``map`` is the joint map's component of the most wall; ``<robot>/map`` is the component
-that a robot is in now, and ``<robot>/base_link`` the robot.
+that a robot is in now. An agent says where the robot's own frames are in it, of which it is told
+(``<robot>/base_link`` where it has none); for a team, ``<robot>/sensor`` is where scans are taken.
 """
 
 import logging
@@ -36,10 +37,13 @@ from mapweave_ros.messages import (
     Transform,
     base_frame,
     map_frame,
+    sensor_frame,
 )
 from mapweave_ros.node import Node
+from mapweave_ros.robot.frames import RobotFrames
 
 TF = "/tf"
+PATIENCE = 50  # scans in a row whose place no transform can tell
 MAX_STAMP = 2.0**31 - 1  # [s] that a ROS time holds
 JOINT_FRAME = "map"
 _log = logging.getLogger(__name__)
@@ -74,13 +78,14 @@ class Speaker:
     ----------
     node
         With the topics of `robot_topics` or `joint_topics`.
-    mounting
-        (3,) the pose of the sensor on the robot, of which poses are [m, m, rad].
+    frames
+        The robot's own; None where what is told is of a team, of whose robots no frame is known.
     """
 
-    def __init__(self, node: Node, mounting: FloatArray = se2.IDENTITY) -> None:
+    def __init__(self, node: Node, frames: RobotFrames | None = None) -> None:
         self._node = node
-        self._to_base = se2.inverse(mounting)
+        self._frames = frames
+        self._untold = 0  # poses in a row
         self._messages = Messages()
         self._frame = ""  # of the joint map's component that is shown
 
@@ -112,12 +117,35 @@ class Speaker:
         stamp = pose.sent if pose.stamp is None or not 0 <= pose.stamp <= MAX_STAMP else pose.stamp
         at = np.array(pose.pose)
         own = map_frame(pose.robot)
-        base = se2.compose(at, self._to_base)
-        told = [Transform(own, base_frame(pose.robot), base, stamp)]
+        placed = self._placed(pose.robot, at, stamp)
+        if placed is None:
+            return
+        child, place = placed
+        told = [Transform(own, child, place, stamp)]
         if pose.joint is not None and pose.joint.frame == self._frame:
             to_joint = se2.compose(np.array(pose.joint.pose), se2.inverse(at))
             told.append(Transform(JOINT_FRAME, own, to_joint, stamp))
         self._node.put(TF, self._messages.transforms(told))
+
+    def _frame_of(self, robot: str) -> str:
+        """Return the frame that is where a robot is."""
+        if self._frames is None:
+            return sensor_frame(robot)
+        return self._frames.of_robot(base_frame(robot))
+
+    def _placed(self, robot: str, at: FloatArray, stamp: float) -> tuple[str, FloatArray] | None:
+        """Return a frame of the robot, and where it is when its sensor is `at` (3,)."""
+        if self._frames is None:
+            return sensor_frame(robot), at
+        placed = self._frames.placed(at, stamp, base_frame(robot))
+        self._untold = 0 if placed is not None else self._untold + 1
+        if self._untold == PATIENCE:
+            _log.warning(
+                "%s: no transform is told: of the times of its scans /tf does not say how its"
+                " frames lie to each other; expected stamps of the same clock",
+                robot,
+            )
+        return placed
 
     def _tell_map(
         self,
@@ -125,11 +153,12 @@ class Speaker:
         frame: str,
         lines: LineMap,
         shown: list[Lines],
-        robots: list[str],
+        robots: Sequence[str],
         marks: Sequence[PlacedMark],
     ) -> None:
         now = time.time()
-        self._node.put(f"{topic}/walls", self._messages.markers(shown, robots, marks, frame, now))
+        named = [(robot, self._frame_of(robot)) for robot in robots]
+        self._node.put(f"{topic}/walls", self._messages.markers(shown, named, marks, frame, now))
         if len(lines.segments) == 0:
             return
         try:

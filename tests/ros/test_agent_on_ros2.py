@@ -1,8 +1,10 @@
 """``mapweave agent --source ros2:…`` as a real process, beside lasers that talk as ROS 2 does."""
 
+import math
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +17,10 @@ from mapweave_protocol.link.session import open_session
 from tests.agent.test_agent import MAPWEAVE, PATIENCE, Listener
 from tests.agent.test_own_agent import assert_mapped, scans_of
 from tests.ros.lasers import HUMBLE_HASH, as_message, laser, laser_scan, native_key
+from tests.ros.listeners import listening
+from tests.ros.moving import TF_MESSAGE, cdr, tf, transform
+from tests.ros.test_beside_scans import robot
+from tests.ros.test_bridge import children
 
 PEER = Path(__file__).with_name("peer.py")
 FORMS = {
@@ -142,3 +148,33 @@ def test_scans_of_every_writing_are_mapped_and_noise_between_them_ends_nothing(
     assert len(listener.maps["a"].components) == 1
     assert listener.statuses["a"].scans_placed == len(scans)
     assert [line.split()[4].partition(":")[0] for line in told] == ["/odd"] * 2
+
+
+def test_an_agent_places_the_frames_that_its_robot_has_in_its_map(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans, network = scans_of(logs[0])[:60], "ros2:?domain=11"
+    kinds = {"/tf_static": (TF_MESSAGE, True), "/tf": (TF_MESSAGE, False)}
+    with (
+        open_session([endpoint], patience=PATIENCE) as session,
+        robot(endpoint, 11, kinds) as node,
+        laser(endpoint, native_key("/scan", domain=11)) as sensor,
+        listening(session, 11, "/tf", TF_MESSAGE) as heard,
+    ):
+        fixed = transform("base_link", "laser", 0.2, 0.0, math.pi / 2)
+        node.put("/tf_static", cdr(tf(fixed), TF_MESSAGE))
+        options = "--rate", "max", "--publish", network
+        with agent(endpoint, team, "ros2:/scan?domain=11", *options):
+            sensor.wait_for_listener()
+            for count, scan in enumerate(scans):
+                if count >= 20:  # odometry comes up late, and says that the robot stands still
+                    moved = transform("odom", "base_link", 1.0, 2.0, 0.5, stamp=scan.stamp)
+                    node.put("/tf", cdr(tf(moved), TF_MESSAGE))
+                sensor.say(as_message(scan))
+                time.sleep(0.05)
+            heard.until(lambda message: ("a/map", "odom") in children(message))
+    told = [children(message) for message in heard.messages]
+    said = [pairs for pairs in told if any(parent == "a/map" for parent, _ in pairs)]
+    assert set.union(*said) <= {("a/map", "base_link"), ("a/map", "odom")}
+    late = said[next(i for i, pairs in enumerate(said) if ("a/map", "odom") in pairs) :]
+    assert all(pairs == {("a/map", "odom")} for pairs in late)  # never two parents again

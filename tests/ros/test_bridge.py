@@ -56,7 +56,7 @@ def test_an_agent_and_a_bridge_show_ros_2_the_walls_and_frames_of_a_team(
             assert process.wait(PATIENCE) == 0
         process_of_agent.send_signal(signal.SIGINT)
         assert process_of_agent.wait(PATIENCE) == 0
-    assert children(joined) == {("a/map", "a/base_link"), ("map", "a/map")}
+    assert children(joined) == {("a/map", "a/sensor"), ("map", "a/map")}
     for topic, frame in (("", "map"), ("/a", "a/map")):
         grid, shown = heard[f"{topic}/map"].messages[-1], heard[f"{topic}/walls"].messages[-1]
         assert grid.header.frame_id == frame

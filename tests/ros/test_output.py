@@ -14,11 +14,13 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import JointComponent, JointMap, RobotMap
 from mapweave.marks import PlacedMark
+from mapweave.scan.mounting import Mounting
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.messages import PoseMessage
 from mapweave_protocol.wire.pose_message import JointPose
 from mapweave_ros.network import Ros2Network
 from mapweave_ros.output import Ros2Output
+from mapweave_ros.robot.frames import RobotFrames
 from mapweave_ros.speaker import topic_name
 from tests.mapweave.buildings import BUILDING, scans_along
 from tests.ros.listeners import STORE, listening
@@ -171,9 +173,10 @@ def pose(joint: JointPose | None = None, stamp: float | None = 5.5) -> PoseMessa
 def test_a_robot_is_where_its_pose_and_the_mounting_of_its_sensor_say(
     endpoint: str, session: zenoh.Session
 ) -> None:
-    mounting = np.array([0.3, -0.1, 0.0])
+    mounting, frames = np.array([0.3, -0.1, 0.0]), RobotFrames()
+    frames.laser_sits("laser", Mounting(0.3, -0.1, 2.0), known=True)
     with (
-        Ros2Output.of_robot(Ros2Network((endpoint,), 25), "r2", mounting) as output,
+        Ros2Output.of_robot(Ros2Network((endpoint,), 25), "r2", frames) as output,
         listening(session, 25, "/tf", TF) as heard,
     ):
         while not heard.messages:  # nobody keeps it for who is late
@@ -206,7 +209,7 @@ def test_the_frames_of_a_team_put_each_robot_where_it_is_in_the_joint_map(
             output.tell(told)
             time.sleep(0.05)
     message = heard.messages[0]
-    base = se2.compose(transform_of(message, "r2/map"), transform_of(message, "r2/base_link"))
+    base = se2.compose(transform_of(message, "r2/map"), transform_of(message, "r2/sensor"))
     np.testing.assert_allclose(base, at, atol=1e-9)
     np.testing.assert_allclose(transform_of(message, "r2/map"), there["r2/0"], atol=1e-9)
     np.testing.assert_array_equal(segments_of(markers, "walls"), lines.segments)

@@ -20,6 +20,8 @@ from mapweave_agent.past_runs import numbered_from
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.asking import ask_map_of_component, ask_runs
 from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.link.security.membership import check_member
+from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 from mapweave_protocol.wire.orders.runs_message import WireRun
@@ -45,6 +47,8 @@ def _run(options: argparse.Namespace) -> int:
     robot = check_id("robot", options.robot or robot_map.robot)
     boot = _boot(options.map, robot_map)
     team, endpoints, link = connection_of(options)
+    if link.keys is not None and link.keys.member.role is not Role.OPERATOR:
+        check_member(link, Member(team, Role.ROBOT, robot))
     parameters = FusionParameters.of(config_of(options))
     with open_session(endpoints, patience=PATIENCE, link=link) as session:
         runs = ask_runs(session, team)

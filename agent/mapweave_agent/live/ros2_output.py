@@ -22,7 +22,7 @@ def output_of(
     endpoints
         Where the router is unless `word` says it.
     source
-        Says where the sensor is on the robot, if it knows.
+        Knows the robot's frames, if it is on a ROS 2 network.
 
     Raises
     ------
@@ -39,6 +39,6 @@ def output_of(
     from mapweave_ros.source import Ros2Source
 
     network = Ros2Network.parse(word, endpoints)
-    known = {"mounting": source.mounting} if isinstance(source, Ros2Source) else {}
-    with Ros2Output.of_robot(network, robot, **known) as output:
+    frames = source.frames if isinstance(source, Ros2Source) else None
+    with Ros2Output.of_robot(network, robot, frames) as output:
         yield output.tell

@@ -8,9 +8,10 @@ import time
 import zenoh
 
 from mapweave.cli import Command
-from mapweave.errors import FileError, MapweaveError
+from mapweave.errors import MapweaveError
 from mapweave_protocol.link.arguments import add_link_arguments, link_of
-from mapweave_protocol.link.security.roster import Role
+from mapweave_protocol.link.security.membership import check_member
+from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.session import router_config
 from mapweave_protocol.link.stopping import stop_on_signal
 
@@ -68,8 +69,8 @@ def run(options: argparse.Namespace) -> int:
     config = router_config(endpoints, link, options.connect)
     if not encrypted and not options.insecure:
         _check_here(endpoints)
-    if link.keys is not None and link.keys.member.role is not Role.ROUTER:
-        raise FileError(link.keys.path, "keys of another member; expected those of the router")
+    if link.keys is not None:
+        check_member(link, Member(link.keys.member.team, Role.ROUTER, Role.ROUTER.value))
     stopping = stop_on_signal()
     with _open(endpoints, config):
         print(f"router: listening at {', '.join(endpoints)}", file=sys.stderr)  # noqa: T201
@@ -103,5 +104,5 @@ command = Command(
     "Run the process through which all the others reach each other.",
     configure,
     run,
-    "--listen tcp/0.0.0.0:7447",
+    "--listen tcp/0.0.0.0:7447 --insecure",
 )

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mapweave.ids import check_id
 from mapweave.text import shown
+from mapweave_protocol.link.security.membership import check_team
 from mapweave_protocol.link.security.settings import TLS_VARIABLE, ZENOH_VARIABLE, LinkSettings
 from mapweave_protocol.link.session import DEFAULT_ENDPOINT, ENDPOINT_VARIABLE, default_endpoints
 
@@ -72,7 +73,11 @@ def connection_of(options: argparse.Namespace) -> tuple[str, tuple[str, ...], Li
         If the team's id is none.
     FileError
         If there is no folder of keys.
+    WrongKeysError
+        If the keys are of another team.
     """
     link = link_of(options)
     endpoints = options.connect or default_endpoints(encrypted=link.keys is not None)
-    return check_id("team", options.team), tuple(endpoints), link
+    team = check_id("team", options.team)
+    check_team(link, team)
+    return team, tuple(endpoints), link

@@ -145,7 +145,7 @@ def _robot_rows(team: Team) -> Iterator[tuple[str, ...]]:
             str(status.map_version),
             "" if behind is None else str(behind),
             str(len(status.holds)),
-            f"{sent / 1e6:.1f} MB",
+            f"{sent / 1e6:.1f} MB" if sent >= 1e6 else f"{sent / 1e3:.0f} kB",
             _refused(status),
             str(status.dropped),
         )

@@ -16,6 +16,7 @@ from mapweave.ids import check_id
 from mapweave.maps import parse_component
 from mapweave.orders import MAX_REASON
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.security.membership import operator_of
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.operator.delivery import PATIENCE
 
@@ -35,7 +36,7 @@ def add_order_arguments(parser: argparse.ArgumentParser, taken_back: str) -> Non
         "--as",
         dest="name",
         metavar="NAME",
-        help=f"who orders it (default ${NAME_VARIABLE} or the login name)",
+        help=f"who orders it (default ${NAME_VARIABLE}, whose keys they are, or the login name)",
     )
     parser.add_argument("--undo", action="store_true", help=f"take back {taken_back}")
     add_connection_arguments(parser)
@@ -48,30 +49,24 @@ def add_reason_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def operator_of(options: argparse.Namespace) -> str:
-    """Return the operator's name.
+@contextmanager
+def connected(options: argparse.Namespace) -> Iterator[tuple[zenoh.Session, str, str]]:
+    """Give a session, the team, and the operator's name.
 
     Raises
     ------
     InvalidIdError
-        If it is no id.
-    """
-    given = options.name or os.environ.get(NAME_VARIABLE) or getpass.getuser().lower()
-    return check_id("operator", given)
-
-
-@contextmanager
-def connected(options: argparse.Namespace) -> Iterator[tuple[zenoh.Session, str]]:
-    """Give a session, and the team.
-
-    Raises
-    ------
+        If that is no id.
+    WrongKeysError
+        If the keys are not an operator's, or another one's.
     UnreachableError
         If no router answers for some seconds.
     """
     team, endpoints, link = connection_of(options)
+    given = operator_of(link, options.name or os.environ.get(NAME_VARIABLE))
+    name = check_id("operator", given or getpass.getuser().lower())
     with open_session(endpoints, patience=PATIENCE, link=link) as session:
-        yield session, team
+        yield session, team, name
 
 
 def component(text: str) -> str:

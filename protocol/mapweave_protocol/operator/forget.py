@@ -14,7 +14,6 @@ from mapweave_protocol.operator.arguments import (
     add_order_arguments,
     add_reason_argument,
     connected,
-    operator_of,
 )
 from mapweave_protocol.operator.delivery import OrderError, deliver, orders_of
 from mapweave_protocol.wire.messages import OrderMessage
@@ -34,9 +33,8 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    name = operator_of(options)
     robot, boot = options.runs
-    with connected(options) as (session, team):
+    with connected(options) as (session, team, name):
         boots = _boots(session, team, robot, boot)
         if options.undo:
             orders = _undone(session, team, robot, boots, name, options.reason)

@@ -16,7 +16,6 @@ from mapweave_protocol.operator.arguments import (
     add_reason_argument,
     component,
     connected,
-    operator_of,
     transform,
 )
 from mapweave_protocol.operator.delivery import (
@@ -49,11 +48,10 @@ def _configure(parser: argparse.ArgumentParser, kind: OrderKind) -> None:
 
 
 def _run(options: argparse.Namespace, kind: OrderKind) -> int:
-    name = operator_of(options)
     pair = options.reference, options.other
     if options.reference == options.other:
         raise OrderError(f"{options.reference}: expected two components, given one twice")
-    with connected(options) as (session, team):
+    with connected(options) as (session, team, name):
         if options.undo:
             orders = _undone(session, team, kind, pair, name, options.reason)
         else:

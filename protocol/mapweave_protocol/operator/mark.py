@@ -13,7 +13,6 @@ from mapweave_protocol.operator.arguments import (
     add_order_arguments,
     component,
     connected,
-    operator_of,
     scan_or_place,
 )
 from mapweave_protocol.operator.delivery import OrderError, deliver, map_of, orders_of
@@ -41,10 +40,9 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    name = operator_of(options)
     if (options.at is None) != options.undo:
         raise OrderError("expected --at, or --undo in its place")
-    with connected(options) as (session, team):
+    with connected(options) as (session, team, name):
         if options.undo:
             orders = _undone(session, team, options, name)
         else:

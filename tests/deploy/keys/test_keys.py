@@ -10,9 +10,12 @@ from cryptography import x509
 
 from mapweave.cli import main
 from mapweave.errors import FileError, InvalidIdError
+from mapweave_agent import Agent
 from mapweave_deploy.keys.team_keys import make_keys
+from mapweave_protocol.errors import WrongKeysError
 from mapweave_protocol.link.security.access import access_rules
 from mapweave_protocol.link.security.folder import KeyFolder
+from mapweave_protocol.link.security.membership import operator_of
 from mapweave_protocol.link.security.roster import Role, Roster
 from mapweave_protocol.link.security.settings import OURS, LinkSettings
 from mapweave_protocol.link.session import session_config
@@ -129,7 +132,51 @@ def test_the_router_takes_no_keys_but_its_own(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["router", "--tls", str(folder / "robots" / "r1")]) == 1
-    assert "expected those of the router" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "keys of robot r1 of team rescue; expected those of router of team rescue" in said
+
+
+OTHERS = [
+    ("robots/r2", "agent --robot r1 --source - --team rescue", "robot r1 of team rescue"),
+    ("robots/r1", "agent --robot r1 --source - --team other", "a member of team other"),
+    ("viewers/bob", "server --team rescue", "coordinator of team rescue"),
+    ("viewers/bob", "mark r1 victim --at 1,2 --team rescue", "an operator of team rescue"),
+    ("robots/r1", "pin r1/0 r2/0 --reason x --team rescue", "an operator of team rescue"),
+    ("operators/ann", "forget r1 --reason x --as eve --team rescue", "operator eve of team rescue"),
+    ("robots/r2", "send {map} --robot r1 --team rescue", "robot r1 of team rescue"),
+    ("viewers/bob", "watch --team other", "a member of team other"),
+]
+
+
+@pytest.mark.parametrize(("whose", "words", "expected"), OTHERS)
+def test_keys_with_which_a_program_could_not_do_its_work_are_refused_at_once(
+    folder: Path, whose: str, words: str, expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # What a router denies it denies in silence: nobody would hear of it.
+    a_map = folder / "map.json"
+    if "{map}" in words:
+        sweep = {"angle_min": -1.5, "angle_increment": 0.01, "ranges": [2.0] * 300}
+        (folder / "scans").write_text(json.dumps(sweep))
+        assert main(["map", str(folder / "scans"), "--output", str(a_map)]) == 0
+    assert main([*words.format(map=a_map).split(), "--tls", str(folder / whose)]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"; expected those of {expected}\n" in said
+
+
+def test_a_program_that_feeds_an_agent_is_refused_with_keys_of_another_robot(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MAPWEAVE_TLS", str(folder / "robots" / "r2"))
+    with pytest.raises(WrongKeysError, match="robot r1"), Agent("r1", "rescue", patience=1.0):
+        pass
+
+
+def test_orders_are_in_the_name_that_the_keys_say(folder: Path) -> None:
+    ann = LinkSettings(KeyFolder.read(folder / "operators" / "ann"))
+    coordinator = LinkSettings(KeyFolder.read(folder / "coordinator"))
+    assert operator_of(ann, None) == operator_of(ann, "ann") == "ann"
+    assert operator_of(coordinator, "eve") == operator_of(LinkSettings(), "eve") == "eve"
 
 
 SETTINGS = {

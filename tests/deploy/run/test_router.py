@@ -11,6 +11,7 @@ import zenoh
 
 from mapweave_deploy.run.launcher import free_endpoint
 from mapweave_deploy.run.router import cause_of
+from mapweave_deploy.run.router import command as router
 from mapweave_protocol.link.session import open_session
 
 PROGRAM = [sys.executable, "-c", "import sys; from mapweave.cli import main; sys.exit(main())"]
@@ -54,6 +55,17 @@ def test_a_port_in_use_ends_in_one_line_and_status_1(endpoint: str) -> None:
     assert (
         second.stderr == f"mapweave: router: cannot listen at {endpoint} (Address already in use)\n"
     )
+
+
+def test_the_example_in_its_help_does_listen() -> None:
+    listen = free_endpoint().replace("127.0.0.1", "0.0.0.0")
+    words = router.example.replace("tcp/0.0.0.0:7447", listen).split()
+    assert listen in words
+    with subprocess.Popen([*PROGRAM, "router", *words], stderr=subprocess.PIPE, text=True) as run:
+        assert run.stderr is not None
+        said = run.stderr.readline()
+        run.terminate()
+    assert "listening" in said
 
 
 def test_ctrl_c_ends_a_router_with_status_0() -> None:

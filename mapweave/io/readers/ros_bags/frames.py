@@ -27,7 +27,10 @@ class StaticFrames:
     def add(self, message: Any) -> None:  # noqa: ANN401 - made at run time from its definition
         """Take what a ``TFMessage`` says; what is no rigid motion is left out."""
         for transform in message.transforms:
-            child, parent = _name(transform.child_frame_id), _name(transform.header.frame_id)
+            child, parent = (
+                frame_name(transform.child_frame_id),
+                frame_name(transform.header.frame_id),
+            )
             motion = rigid(transform.transform)
             if motion is not None and child != parent and len(self._parents) < MAX_FRAMES:
                 self._parents[child] = parent, motion
@@ -42,7 +45,28 @@ class StaticFrames:
         TiltedError
             If it looks up or down.
         """
-        name = _name(frame)
+        found = self._placed(frame)
+        if found is None:
+            return None
+        _, placed = found
+        upright = placed[2, 2]
+        tilt = math.acos(min(1.0, abs(upright)))
+        if tilt > MAX_TILT:
+            raise TiltedError(f"is tilted by {math.degrees(tilt):.0f}°")
+        x, y = placed[:2, 3].tolist()
+        return Mounting(x, y, math.atan2(placed[1, 0], placed[0, 0]), bool(upright < 0))
+
+    def fixed(self, frame: str) -> tuple[str, FloatArray] | None:
+        """Return what a frame is fixed to, and its (3,) pose there [m, m, rad]; None for nothing.
+
+        Seen from above: how it is tilted is left out.
+        """
+        found = self._placed(frame)
+        return None if found is None else (found[0], _on_the_floor(found[1]))
+
+    def _placed(self, frame: str) -> tuple[str, FloatArray] | None:
+        """Return the frame that all others are fixed to, and (4, 4) of `frame` in it."""
+        name = frame_name(frame)
         if name not in self._parents:
             return None
         placed, seen = np.eye(4), {name}
@@ -52,12 +76,7 @@ class StaticFrames:
             if name in seen:
                 return None  # each is fixed to the other
             seen.add(name)
-        upright = placed[2, 2]
-        tilt = math.acos(min(1.0, abs(upright)))
-        if tilt > MAX_TILT:
-            raise TiltedError(f"is tilted by {math.degrees(tilt):.0f}°")
-        x, y = placed[:2, 3].tolist()
-        return Mounting(x, y, math.atan2(placed[1, 0], placed[0, 0]), bool(upright < 0))
+        return name, placed
 
 
 def rigid(transform: Any) -> FloatArray | None:  # noqa: ANN401
@@ -85,6 +104,11 @@ def planar(transform: Any) -> FloatArray | None:  # noqa: ANN401
     motion = rigid(transform)
     if motion is None:
         return None
+    return _on_the_floor(motion)
+
+
+def _on_the_floor(motion: FloatArray) -> FloatArray:
+    """(3,) of a (4, 4) motion [m, m, rad]."""
     return np.array([motion[0, 3], motion[1, 3], math.atan2(motion[1, 0], motion[0, 0])])
 
 
@@ -99,7 +123,7 @@ def odometry_in(message: Any) -> Iterable[tuple[float, FloatArray]]:  # noqa: AN
         stamped = [
             (each.header, each.transform)
             for each in message.transforms
-            if _name(each.header.frame_id).endswith("odom")
+            if frame_name(each.header.frame_id).endswith("odom")
         ]
     for header, value in stamped:
         pose = planar(value)
@@ -107,5 +131,6 @@ def odometry_in(message: Any) -> Iterable[tuple[float, FloatArray]]:  # noqa: AN
             yield header.stamp.sec + header.stamp.nanosec * 1e-9, pose
 
 
-def _name(frame: str) -> str:
-    return frame.lstrip("/")  # as ROS 1 wrote them once
+def frame_name(frame: str) -> str:
+    """Return a frame's name without the slash with which ROS 1 wrote it once."""
+    return frame.lstrip("/")

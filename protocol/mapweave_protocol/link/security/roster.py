@@ -34,6 +34,10 @@ class Member:
     role: Role
     name: str
 
+    def __str__(self) -> str:
+        alone = self.name == self.role.value
+        return f"{self.role.value} {'' if alone else f'{self.name} '}of team {self.team}"
+
     @property
     def common_name(self) -> str:
         """What its certificate is made out to; no id has a dot, so none is another's."""

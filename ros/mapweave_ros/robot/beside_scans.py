@@ -12,7 +12,6 @@ from mapweave.io.readers.odometry_track import OdometryTrack
 from mapweave.io.readers.ros_bags.frames import (
     TF,
     TF_STATIC,
-    StaticFrames,
     TiltedError,
     odometry_in,
 )
@@ -25,6 +24,7 @@ from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_ros.refusals import Refusals
+from mapweave_ros.robot.frames import RobotFrames
 from mapweave_ros.scan_messages import ScanMessages
 from mapweave_ros.topics import TopicKeys, dds_type_of
 
@@ -38,6 +38,8 @@ class BesideScans:
     ----------
     domain
         Of ROS 2.
+    frames
+        Take what is said of transforms; of those that change where they are followed.
     odometry
         Its topic, such as ``/odom``, or one called ``tf``; None for none.
     tell
@@ -48,15 +50,18 @@ class BesideScans:
         self,
         messages: ScanMessages,
         domain: int,
+        frames: RobotFrames,
         odometry: str | None,
         tell: Callable[[str], None],
     ) -> None:
         self._messages = messages
         self._tell = tell
-        self._frames = StaticFrames()
+        self._frames = frames
         self._track = OdometryTrack(REMEMBERED)
         self._asked = odometry
         self._heard = {TF_STATIC: _Heard(TF_STATIC, domain, TF_MESSAGE, tell)}
+        if frames.followed:
+            self._heard[TF] = _Heard(TF, domain, TF_MESSAGE, tell)
         if odometry is not None:
             kind = TF_MESSAGE if odometry.endswith(TF) else ODOMETRY
             self._heard[odometry] = _Heard(odometry, domain, kind, tell)
@@ -85,7 +90,9 @@ class BesideScans:
         if decoded is None:
             return True
         if topic == TF_STATIC:
-            self._frames.add(decoded)
+            self._frames.say_fixed(decoded)
+        if topic == TF and self._frames.followed:
+            self._frames.say_moving(decoded)
         if topic == self._asked:
             for stamp, pose in odometry_in(decoded):
                 self._track.add(stamp, pose)
