@@ -29,13 +29,14 @@ class Built:
         When that was all that was known [s since 1970].
     joint
         The joint map.
-    payload
-        Its message.
+    message, payload
+        What says it, and as it travels when it travels whole.
     """
 
     draft: Draft
     begun: float
     joint: JointMap
+    message: JointMapMessage
     payload: bytes
 
 
@@ -104,10 +105,13 @@ class VersionBuilder:
             return None
         return future.result()
 
-    def packed(self, joint: JointMap) -> bytes:
-        """Return the message of `joint`."""
-        return encode(JointMapMessage.pack(joint, self.series))
+    def in_series(self, built: Built) -> Built:
+        """Return a version as one of the series that is set now."""
+        return self._packed(built.draft, built.begun, built.joint)
 
     def _build(self, draft: Draft, begun: float) -> Built:
-        joint = draft.build(self._builder)
-        return Built(draft, begun, joint, self.packed(joint))
+        return self._packed(draft, begun, draft.build(self._builder))
+
+    def _packed(self, draft: Draft, begun: float, joint: JointMap) -> Built:
+        message = JointMapMessage.pack(joint, self.series)
+        return Built(draft, begun, joint, message, encode(message))

@@ -161,8 +161,8 @@ class Service:
         built = self._builder.take()
         if built is not None:
             # Stored first: what was published once must be there after a crash.
-            kept = decode(JointMapMessage, self._keep(built))
-            self._publisher.put(self._joints.payload(kept))
+            kept = self._keep(built)
+            self._publisher.put(self._joints.payload(kept.message, kept.payload))
             self._frames = frames_of(built.joint)
             self._look_due = 0.0
             self._speaking.hurry()  # robots wait for their new frames
@@ -170,18 +170,18 @@ class Service:
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
 
-    def _keep(self, built: Built) -> bytes:
-        """Store a version; return its message, of another series where there is no room."""
-        number, payload = built.draft.version, built.payload
+    def _keep(self, built: Built) -> Built:
+        """Store a version; return it, as one of another series where there is no room."""
+        number = built.draft.version
         try:
-            self._store.add_version(number, built.begun, payload, self._covers)
+            self._store.add_version(number, built.begun, built.payload, self._covers)
         except UnwritableError as error:
             self._store.hold()
             self._builder.series = self._store.series
-            payload = self._builder.packed(built.joint)
-            self._store.add_version(number, built.begun, payload, self._covers)
+            built = self._builder.in_series(built)
+            self._store.add_version(number, built.begun, built.payload, self._covers)
             _log.error("%s; going on without it until there is room", error)
-        return payload
+        return built
 
     def _resume_storing(self) -> None:
         if not self._store.is_storing and self._store.resume():
@@ -191,7 +191,8 @@ class Service:
         """Publish the latest version of the store: the cache died with the last publisher."""
         latest = self._store.version(self._store.latest_version)
         if latest is not None:
-            self._publisher.put(self._joints.payload(decode(JointMapMessage, latest)))
+            message = decode(JointMapMessage, latest)
+            self._publisher.put(self._joints.payload(message, latest))
             _log.info("version %d published again", self._store.latest_version)
 
     def _say_how_it_is(self, now: float) -> None:

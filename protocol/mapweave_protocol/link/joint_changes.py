@@ -12,10 +12,15 @@ class JointSender:
     def __init__(self) -> None:
         self._last: JointMapMessage | None = None
 
-    def payload(self, message: JointMapMessage) -> bytes:
-        """Return what to publish so that who has the version before gets this one."""
+    def payload(self, message: JointMapMessage, whole: bytes) -> bytes:
+        """Return what to publish so that who has the version before gets this one.
+
+        Parameters
+        ----------
+        whole
+            The payload of `message`, which is a complete version.
+        """
         last, self._last = self._last, message
-        whole = encode(message)
         if last is None or not message.follows(last) or message.version % VERSIONS_TO_COMPLETE == 1:
             return whole
         return min(encode(message.since(last)), whole, key=len)

@@ -10,6 +10,7 @@ of what came (`budget`).
 import re
 import zlib
 from decimal import Decimal
+from functools import lru_cache
 from typing import TypeVar
 
 import msgpack
@@ -26,6 +27,7 @@ MAX_PAYLOAD = 16 * MIB  # of any kind
 PLAIN, DEFLATED = b"\0", b"\1"
 _HEAD = len(MAGIC) + 3
 _MAX_EXPONENT = 40
+REMEMBERED = 2**14  # numbers, of some 100 bytes
 _BOOT = 100  # the type of an extension that is 8 hexadecimal digits, such as name runs
 _HEXADECIMAL = re.compile(r"[0-9a-f]{8}")
 _EARLIER = (0x83,)  # a msgpack map of three, which versions 1 and 2 began with
@@ -149,6 +151,7 @@ def _extended(value: object) -> object:
     return value
 
 
+@lru_cache(maxsize=REMEMBERED)  # most numbers of a version were in the one before
 def _decimal(value: float) -> object:
     sign, digits, exponent = Decimal(repr(value)).as_tuple()
     if not isinstance(exponent, int) or not -_MAX_EXPONENT <= exponent <= _MAX_EXPONENT:
