@@ -204,7 +204,11 @@ def from_rings(outlines: Iterable[FloatArray]) -> BaseGeometry:
         (k, 2) the vertices of each [m], one frame; those of fewer than three are no area.
     """
     polygons = [Polygon(ring) for ring in outlines if len(ring) >= 3]
-    return shapely.union_all(shapely.make_valid(polygons)) if polygons else Polygon()
+    if not polygons:
+        return Polygon()
+    # No lines, into which an outline that runs back on itself would fall: they are no area.
+    areas = shapely.make_valid(polygons, method="structure", keep_collapsed=False)
+    return shapely.union_all(areas)
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:

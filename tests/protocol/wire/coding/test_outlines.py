@@ -68,3 +68,24 @@ def test_whatever_was_seen_its_areas_are_valid_and_none_reaches_far_beyond(
         area = Polygon(outside, holes)
         assert area.is_valid
         assert allowed.covers(area)
+
+
+def test_an_outline_that_runs_back_on_itself_has_the_area_beside() -> None:
+    spiked = np.array([[0, 0], [40, 0], [40, 20], [60, 20], [40, 20], [40, 40], [0, 40]], float)
+    [(outside,)] = straightened([spiked], DEPTH, DEVIATION)
+    assert Polygon(outside).equals(shapely.box(0, 0, 40, 40))
+
+
+@given(
+    outlines=st.lists(
+        st.lists(st.tuples(*[st.integers(-40, 40)] * 2), min_size=3, max_size=9),
+        min_size=1,
+        max_size=3,
+    )
+)
+@settings(max_examples=150, deadline=None)
+def test_outlines_that_cross_make_areas_as_well(outlines: list[list[tuple[int, int]]]) -> None:
+    for outside, *holes in straightened(
+        [np.array(each) / 2 for each in outlines], DEPTH, DEVIATION
+    ):
+        assert Polygon(outside, holes).is_valid
