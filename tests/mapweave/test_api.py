@@ -188,18 +188,15 @@ def test_maps_and_alignments_that_can_be_gone_through_once_are_fused() -> None:
 
 
 def test_maps_are_compared_as_the_configuration_says() -> None:
-    scans, _ = scans_along(BUILDING, [(2, 1), (4, 1)], 1)
-    mapper = mapweave.Mapper("a")
-    for scan in scans:
-        mapper.add(scan)
-    made = mapper.finish()
+    made = robot_map("a", [(2, 1), (14, 1)], 1)
     config = mapweave.Config(mapping=mapweave.Mapping(min_confidence=0.999, closeness=0.1))
     by_hand = FusionParameters.of(config)
+    other = robot_map("b", [(10, 1), (26, 1)], 2)
     (found,), (same,) = (
-        mapweave.align(made, made, config=config),
-        mapweave.align(made, made, by_hand),
+        mapweave.align(made, other, config=config),
+        mapweave.align(made, other, by_hand),
     )
-    (otherwise,) = mapweave.align(made, made)
+    (otherwise,) = mapweave.align(made, other)
     assert found.evidence == same.evidence != otherwise.evidence
 
 

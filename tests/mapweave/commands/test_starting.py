@@ -13,7 +13,15 @@ from mapweave.io.map_files import read_joint, read_map, write_joint, write_map
 from mapweave.maps import JointMap, LineMap, RobotMap, Submap, Trajectory
 from mapweave.marks import Mark
 from mapweave.scan.scan import Scan
-from tests.mapweave.buildings import AROUND, BUILDING, part, random_pose, scans_along, shaken
+from tests.mapweave.buildings import (
+    AROUND,
+    BUILDING,
+    SLANTED,
+    part,
+    random_pose,
+    scans_along,
+    shaken,
+)
 from tests.mapweave.commands.test_commands import assert_fails_in_one_line, main_here, mapweave
 
 THERE = [(3, 1), (13, 1), (13, -3), (13, 1), (18, 1), (18, 4), (18, 1), (28, 1)]
@@ -203,7 +211,7 @@ def test_marks_of_a_stored_joint_map_come_along(tmp_path: Path) -> None:
 
 
 def test_a_map_servers_grid_becomes_a_robots_map_and_takes_no_start(tmp_path: Path) -> None:
-    room = part(BUILDING, 0, 18)
+    room = part(SLANTED, 0, 18)
     stored, grid, output = (tmp_path / name for name in ("a.json", "grid.yaml", "g.json"))
     write_map(stored, RobotMap("a", "0", 1, (Submap(0, 0, np.zeros(3), room, Trajectory.empty()),)))
     assert main_here("export", stored, grid).returncode == 0

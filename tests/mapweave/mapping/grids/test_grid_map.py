@@ -17,7 +17,7 @@ from mapweave.mapping.grids.grid_map import map_of_grid
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave.scan.free_space import from_rings
-from tests.mapweave.buildings import BUILDING, part, scans_along
+from tests.mapweave.buildings import BUILDING, SLANTED, part, scans_along
 
 RESOLUTION = 0.05
 A_CELL = 2**0.5 * RESOLUTION  # [m] across
@@ -91,10 +91,10 @@ def test_the_grids_origin_and_its_turn_are_the_maps_frame() -> None:
 
 
 def test_a_grid_is_joined_with_the_map_of_a_robot_that_was_there(tmp_path: Path) -> None:
-    export(stored(part(BUILDING, 0, 30), np.zeros(3)), tmp_path / "map.yaml")
+    export(stored(part(SLANTED, 0, 30), np.zeros(3)), tmp_path / "map.yaml")
     grid = map_of_grid(read_grid(tmp_path / "map.yaml"), "g")
     mapper = Mapper("r")
-    scans, poses = scans_along(BUILDING, [(3, 1), (13, 1), (13, -3), (13, 1), (27, 1)], 1)
+    scans, poses = scans_along(SLANTED, [(3, 1), (13, 1), (13, -3), (13, 1), (27, 1)], 1)
     for scan in scans:
         mapper.add(scan)
     (alignment,) = align(grid, mapper.finish())
