@@ -346,7 +346,7 @@ class Mapper:
         if self._growing.is_empty:
             self._frame = tracked.pose
         local = se2.between(self._frame, tracked.pose)
-        held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
+        held = pose_uncertainty(tracked.information, self.parameters.uncertainty, tracked.drift)
         if seen.scan.index == self._next_index - 1:  # not one that is found again with it
             self._held = held
         held = turn_uncertainty(held, -self._frame[2])
