@@ -19,6 +19,8 @@ from mapweave.maps import Submap, Trajectory
 
 CLOSURE_LENGTH = 2.0  # [m] of tracked path that errs about as much as a closure
 
+OPEN_STEP = 0.5  # [m], [rad] that a scan counts, however far off it may be
+
 
 class SubmapGraphParameters(BaseModel):
     """How sure tracking is, and how far a closure reaches."""
@@ -39,6 +41,9 @@ class SubmapGraphParameters(BaseModel):
         gt=0,
         description="by how much more a submap errs than one of its scans: those are held to"
         " 0.022-0.028 m (median of five logs), in corridors less along them",
+    )
+    drifted: float = Field(
+        0.1, gt=0, description="[m], [rad] that no scan errs by that something holds"
     )
     joining_sigma: float = Field(0.1, gt=0, description="[m] of components joined by their shapes")
     joining_turn: float = Field(0.01, gt=0, description="[rad] of components joined")
@@ -189,7 +194,8 @@ def tracking_covariance(path: Trajectory, step: FloatArray, p: SubmapGraphParame
     held = path.uncertainty
     if held is None or not held.any():
         return np.diag(np.array([p.tracking_sigma, p.tracking_sigma, p.tracking_turn]) ** 2)
-    least, across, turn, direction = held.T
+    least, across, turn = (_beyond(each, p.drifted) for each in held.T[:3])
+    direction = held[:, 3]
     c, s = np.cos(direction - step[2]), np.sin(direction - step[2])
     axes = np.stack([np.column_stack([c, s]), np.column_stack([-s, c])])
     squares = np.stack([least, across]) ** 2
@@ -198,3 +204,14 @@ def tracking_covariance(path: Trajectory, step: FloatArray, p: SubmapGraphParame
     covariance[:2, :2] *= p.drift**2
     covariance[2, 2] = (turn**2).mean()
     return covariance
+
+
+def _beyond(sigmas: FloatArray, drifted: float) -> FloatArray:
+    """(n,) `sigmas` of scans, without what all of them had drifted before they were taken.
+
+    It moves a submap as a whole.
+    """
+    least = sigmas.min()
+    if least <= drifted:
+        return np.minimum(sigmas, OPEN_STEP)
+    return np.sqrt(np.minimum(sigmas, OPEN_STEP) ** 2 - min(least, OPEN_STEP) ** 2 + drifted**2)

@@ -10,6 +10,7 @@ both ways, and it is counted how many of its returns then lie on no known surfac
 """
 
 import math
+from collections import deque
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
@@ -25,16 +26,21 @@ class DriftParameters(StageParameters):
     """When a direction is open."""
 
     shift: float = derived(
-        lambda c: 1.2 * c.mapping.closeness,
+        lambda c: 2 * c.mapping.closeness,
         gt=0,
-        description="[m] by which a scan is moved, its points at the mean: twice what explains one",
+        description="[m] by which a scan is moved, its points at the mean",
+    )
+    reach: float = derived(
+        lambda c: 0.6 * c.mapping.closeness,
+        gt=0,
+        description="[m] of a surface within which a point is on it",
     )
     held: int = Field(
-        4,
+        5,
         ge=1,
         description="points that are then on no surface, each way, by which a direction is held;"
-        " in round rooms and bare corridors there are 3 at the most, in recordings of offices 8"
-        " and more in 19 of 20 scans",
+        " in round rooms, bare corridors and along one wall there are 4 at the most in 19 of 20"
+        " scans, in recordings of offices 8 and more in as many",
     )
     returned: float = Field(
         0.1,
@@ -42,6 +48,9 @@ class DriftParameters(StageParameters):
         lt=1,
         description="share of the points, by which what was mapped before it drifted holds it,"
         " where it explains most of what is explained",
+    )
+    lately: int = Field(
+        5, ge=1, description="scans, most of which must leave a direction open for it to be so"
     )
     suspicious: float = Field(
         0.1,
@@ -62,6 +71,13 @@ class Pace(NamedTuple):
     turn: float
 
 
+class _Opened(NamedTuple):
+    """A scan that left a direction open: the newest point when it came, and its step."""
+
+    newest: int
+    pace: Pace
+
+
 class Surroundings(Protocol):
     """What a scan is held by."""
 
@@ -69,8 +85,10 @@ class Surroundings(Protocol):
     def newest(self) -> int:
         """The number of the newest point."""
 
-    def explained(self, points: OrientedPoints, poses: FloatArray, until: int) -> BoolArray:
-        """(k, n) which points lie on surfaces known before point number `until`, at each pose."""
+    def explained(
+        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
+    ) -> BoolArray:
+        """(k, n) which points lie within `reach` [m] of surfaces, up to point number `until`."""
 
 
 class Drift:
@@ -86,12 +104,14 @@ class Drift:
         self._p = parameters
         self._scale = np.array([1.0, 1.0, 1.0 / parameters.lever])
         self._old = -1  # the newest point that was mapped before it drifted
+        self._lately: deque[_Opened | None] = deque(maxlen=parameters.lately)
         self.covariance: FloatArray = np.zeros((3, 3))
 
     def copy(self) -> Self:
         """Return one that goes on by itself from here."""
         other = type(self)(self._p)
-        other._old, other.covariance = self._old, self.covariance
+        other._old, other._lately = self._old, self._lately.copy()
+        other.covariance = self.covariance
         return other
 
     def follow(
@@ -103,7 +123,7 @@ class Drift:
         known: Surroundings,
         pace: Pace,
     ) -> bool:
-        """Go on to a scan that was found by what is `known`; return whether a direction is open.
+        """Go on to a scan that was found by what is `known`; return whether it drifts.
 
         Parameters
         ----------
@@ -116,18 +136,32 @@ class Drift:
         seen
             Its points, sensor frame.
         """
-        drifts = self.covariance.any()
-        if drifts:
+        if self.covariance.any():
             carried = np.eye(3)
             carried[:2, 2] = -step[1], step[0]
             self.covariance = carried @ self.covariance @ carried.T
         self._return(pose, seen, known)
         opened = self._open(pose, information, seen, known)
-        if len(opened) and not drifts:
-            self._old = known.newest
+        self._lately.append(_Opened(known.newest, pace) if opened else None)
+        return self._drift(opened)
+
+    def _drift(self, opened: list[FloatArray]) -> bool:
+        """Grow along what is `opened`, once most of the scans lately left something open.
+
+        One or two alone may only have seen too little that was known.
+        """
+        lately = [each for each in self._lately if each is not None]
+        if not opened or 2 * len(lately) <= self._p.lately:
+            return False
+        pace = lately[-1].pace
+        if not self.covariance.any():
+            self._old = lately[0].newest
+            pace = Pace(
+                sum(each.pace.way for each in lately), sum(each.pace.turn for each in lately)
+            )
         for direction in opened:
             self._grow(direction, pace)
-        return bool(opened)
+        return True
 
     def _open(
         self, pose: FloatArray, information: FloatArray, seen: OrientedPoints, known: Surroundings
@@ -145,19 +179,28 @@ class Drift:
 
     def _return(self, pose: FloatArray, seen: OrientedPoints, known: Surroundings) -> None:
         """Forget what has drifted along directions in which old surfaces hold `seen` again."""
-        axes = self._axes()
-        if not axes:
-            return
-        enough = max(self._p.held, self._p.returned * len(seen))
-        old, of_all = (known.explained(seen, pose[None], k).sum() for k in (self._old, known.newest))
-        for direction, sigma in axes:
-            held = 2 * old > of_all and (
-                self._missing(direction, pose, seen, known, self._old) >= enough
-            )
-            if sigma < self._p.forgotten or held:
+        for direction, sigma in self._axes():
+            if sigma < self._p.forgotten or self._is_back(direction, pose, seen, known):
                 metric = direction / self._scale**2
                 left = np.eye(3) - np.outer(direction, metric) / (direction @ metric)
                 self.covariance = left @ self.covariance @ left.T
+
+    def _is_back(
+        self, direction: FloatArray, pose: FloatArray, seen: OrientedPoints, known: Surroundings
+    ) -> bool:
+        """Whether what was mapped before it drifted holds it along a `direction` (3,).
+
+        It is most of what explains the scan, and does so there alone, as all that is known does.
+        """
+        here, reach = pose[None], self._p.reach
+        old, of_all = (
+            known.explained(seen, here, reach, k).sum() for k in (self._old, known.newest)
+        )
+        enough = max(self._p.held, self._p.returned * len(seen))
+        return 2 * old > of_all and all(
+            self._missing(direction, pose, seen, known, until) >= enough
+            for until in (self._old, known.newest)
+        )
 
     def _axes(self) -> list[tuple[FloatArray, float]]:
         """Return the motions (3,) along which it has drifted, and by how much [m] at the lever."""
@@ -183,7 +226,8 @@ class Drift:
         arms = seen.points @ se2.rotation(pose[2]).T
         moved = direction[:2] + direction[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         step = self._p.shift / math.sqrt((moved**2).sum(axis=1).mean()) * direction
-        on_surface = known.explained(seen, np.array([pose, pose + step, pose - step]), until)
+        poses = np.array([pose, pose + step, pose - step])
+        on_surface = known.explained(seen, poses, self._p.reach, until)
         here, there, back = on_surface.sum(axis=1).tolist()
         return int(here - max(there, back))
 
@@ -193,8 +237,7 @@ class Drift:
         A pace that is off is off in the next step too: so sigmas add up, not their squares.
         """
         grown = 1.0 / math.sqrt(
-            (direction[0] ** 2 + direction[1] ** 2) / pace.way**2
-            + direction[2] ** 2 / pace.turn**2
+            (direction[0] ** 2 + direction[1] ** 2) / pace.way**2 + direction[2] ** 2 / pace.turn**2
         )
         metric = direction / self._scale**2
         drifted = math.sqrt(max(metric @ self.covariance @ metric, 0.0)) / (direction @ metric)

@@ -192,9 +192,13 @@ class LocalMap:
             self._raster = LikelihoodField.of(self._known.content()[0], centre[:2], p)
         return self._raster
 
-    def explained(self, points: OrientedPoints, poses: FloatArray, until: int) -> BoolArray:
-        """(k, n) which `points` lie on surfaces seen up to point number `until`, at each pose."""
-        reach = self._parameters.overlap
+    def explained(
+        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
+    ) -> BoolArray:
+        """(k, n) which `points` lie within `reach` [m] of surfaces, at each of `poses` (k, 3).
+
+        Of those that were seen up to point number `until`.
+        """
         if until >= self._newest:
             return self._known.explains(points.points, points.normals, poses, reach)
         placed = [points.moved(pose) for pose in poses]

@@ -11,7 +11,6 @@ from mapweave.mapping.tracking.motion_model import MotionModel
 from mapweave.mapping.tracking.reachability import Reachability
 from mapweave.scan.scan import Scan
 
-
 LEAST = 1e-3  # [m], [rad] that no step is known better than
 
 

@@ -365,7 +365,6 @@ class Tracker:
             for fit, evidence, step in zip(fits, judged, steps, strict=True)
         ]
 
-
     def _thinned(self, seen: Observation) -> OrientedPoints:
         stride = 1 + (len(seen.oriented) - 1) // self.parameters.max_points
         return seen.oriented.at(slice(None, None, stride))
