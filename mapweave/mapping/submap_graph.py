@@ -214,4 +214,5 @@ def _beyond(sigmas: FloatArray, drifted: float) -> FloatArray:
     least = sigmas.min()
     if least <= drifted:
         return np.minimum(sigmas, OPEN_STEP)
-    return np.sqrt(np.minimum(sigmas, OPEN_STEP) ** 2 - min(least, OPEN_STEP) ** 2 + drifted**2)
+    beyond = np.minimum(sigmas, OPEN_STEP) ** 2 - min(least, OPEN_STEP) ** 2
+    return np.asarray(np.sqrt(beyond + drifted**2))

@@ -14,73 +14,34 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
-    AcceptanceParameters,
     ScanMatch,
     is_acceptable,
     is_ambiguous,
     is_credible,
     tell_apart,
 )
-from mapweave.mapping.tracking.drift import Drift, DriftParameters
-from mapweave.mapping.tracking.local_map import LocalMap, LocalMapParameters, ScanEvidence
-from mapweave.mapping.tracking.motion_model import MotionModel, MotionModelParameters
+from mapweave.mapping.tracking.drift import Drift
+from mapweave.mapping.tracking.local_map import LocalMap, ScanEvidence
+from mapweave.mapping.tracking.motion_model import MotionModel
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.reach import Reach, pace, reach
-from mapweave.mapping.tracking.reachability import Reachability, ReachabilityParameters
+from mapweave.mapping.tracking.reachability import Reachability
 from mapweave.mapping.tracking.shape_starts import shape_starts
+from mapweave.mapping.tracking.tracker_parameters import TrackerParameters
 from mapweave.maps import LineMap
 from mapweave.matching.icp import align_all
-from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints
 from mapweave.scan.scan import Scan
-from mapweave.shape.correspondence import CorrespondenceParameters
+
+__all__ = ["Found", "Tracker", "TrackerParameters"]
 
 Found = list[tuple[Observation, ScanMatch]]
 EQUAL = 1e-3  # share of the returns by which worth must differ to matter
-
-
-class TrackerParameters(StageParameters):
-    """What the tracker remembers, expects and accepts."""
-
-    local_map: LocalMapParameters = derived(LocalMapParameters.of)
-    correspondence: CorrespondenceParameters = CorrespondenceParameters()
-    motion_model: MotionModelParameters = MotionModelParameters()
-    acceptance: AcceptanceParameters = AcceptanceParameters()
-    reachability: ReachabilityParameters = derived(ReachabilityParameters.of)
-    drift: DriftParameters = derived(DriftParameters.of)
-    line_spacing: float = derived(
-        lambda c: c.mapping.resolution, gt=0, description="[m] between points on the map's lines"
-    )
-    max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
-    max_step: float = derived(
-        lambda c: 0.5 + c.robot.max_speed * c.sensor.interval,
-        gt=0,
-        description="[m] between scans that are tracked: driven, and 0.5 m for poses that err",
-    )
-    promising: float = Field(
-        0.6, ge=0, le=1, description="of the best start's support that another must have early"
-    )
-    prior_sigma: float = Field(0.5, gt=0, description="[m] of a prediction, in the alignment")
-    prior_turn: float = Field(0.35, gt=0, description="[rad] the same for the turn")
-    open_novelty: float = Field(
-        0.8, ge=0, le=1, description="what a return at a new place counts along bare walls"
-    )
-    widest: float = Field(
-        4.0, gt=0, description="[m] searched each way, at the most: a keyframe log's longest steps"
-    )
-    open_step: float = Field(0.2, gt=0, description="[m] between places tried")
-    first_window: float = derived(
-        lambda c: min(np.pi, 1.15 / np.pi * c.robot.max_turn_rate * c.sensor.interval),
-        gt=0,
-        description="[rad] half the rotation searched first",
-    )
-    min_points: int = Field(20, ge=3, description="a scan with fewer oriented points is blind")
 
 
 class _State(NamedTuple):
@@ -168,8 +129,9 @@ class Tracker:
         """Forget the scan on probation, if any: it is missed, as those after it are."""
         if self._before is not None:
             since = [self._probation[0][0], *self.missed]
-            self.pose, missed, self._motion, self._odometry, self._local, *at = self._before
-            self.missed, (self._reachability, self._drift) = [*missed, *since], at
+            self.pose, missed, self._motion, self._odometry, self._local, *_ = before = self._before
+            self._reachability, self._drift = before.reachability, before.drift
+            self.missed = [*missed, *since]
         self._before, self._probation = None, []
 
     def is_blind(self, seen: Observation) -> bool:
