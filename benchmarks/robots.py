@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.coverage import metres_in_common, returns_at, wall_cells
-from benchmarks.robot_cases import Case, recordings, simulated
+from benchmarks.robot_cases import Case, recordings, simulated, worlds
 from benchmarks.speed.rows import Figure
 from benchmarks.tables import OUTPUT, format_table, write_json
 from benchmarks.truth import Path2D, paths, position_error, steps_right, true_frame
@@ -75,6 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=float, default=600.0, help="of a drive among people (%(default)s)"
     )
+    parser.add_argument("--seeds", type=int, default=15, help="of each world (%(default)s)")
     parser.add_argument(
         "--report-only", action="store_true", help="exit status 0, whatever is reached"
     )
@@ -90,7 +91,7 @@ def run(options: argparse.Namespace) -> None:
         With status 1 if a figure falls short, unless only a report was asked for.
     """
     outcomes = []
-    for case in chain(recordings(), simulated(options.seconds)):
+    for case in chain(recordings(), simulated(options.seconds), worlds(options.seeds)):
         if not options.only or case.group in options.only:
             outcomes.append(measure(case))
             write_json(options.output, [asdict(each) for each in outcomes])
@@ -190,7 +191,7 @@ def figures(outcome: Outcome) -> Iterator[Figure]:
         yield Figure("worst scan / median", o.worst, 10)
     elif group in SHARES:
         yield Figure("largest", 100 * o.largest, 100 * largest, "%", at_least=True)
-    else:
+    elif group != "world":
         yield Figure("components", o.components, 1)
     if right is not None:
         yield Figure("steps right", 100 * o.steps_right, 100 * right, "%", at_least=True)
