@@ -1,7 +1,7 @@
 """How well determined a pose is, per direction: what ICP held it by, in metres and radians.
 
 Along a corridor's walls nothing holds a scan; across them they do. The error that is told is that
-of a scan against what was mapped lately, not what adds up over a path.
+of a scan against what was mapped lately, and what adds up where nothing holds it; see `Drift`.
 """
 
 import math
