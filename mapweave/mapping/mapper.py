@@ -364,6 +364,7 @@ class Mapper:
         )
         self._finished.append(submap)
         self._unsettled, self._follows = Unsettled(self._growing), True
+        self._tracker.drift.mark()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._merged = {}
         self._version += 1
@@ -383,6 +384,8 @@ class Mapper:
         self._version += 1
         self._newest_component = max(self._newest_component, settled.newest_component)
         if self._follows:
+            if settled.is_held:
+                self._tracker.drift.end()
             after = _end(self._finished[-1])
             self._component = self._finished[-1].component
             moved = se2.compose(after, se2.inverse(before))

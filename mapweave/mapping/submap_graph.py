@@ -14,11 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.mapping.continuation import links_to_keep
+from mapweave.mapping.drifted_paths import beyond
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.maps import Submap, Trajectory
 
 CLOSURE_LENGTH = 2.0  # [m] of tracked path that errs about as much as a closure
-
 OPEN_STEP = 0.5  # [m], [rad] that a scan counts, however far off it may be
 
 
@@ -41,9 +41,6 @@ class SubmapGraphParameters(BaseModel):
         gt=0,
         description="by how much more a submap errs than one of its scans: those are held to"
         " 0.022-0.028 m (median of five logs), in corridors less along them",
-    )
-    drifted: float = Field(
-        0.1, gt=0, description="[m], [rad] that no scan errs by that something holds"
     )
     joining_sigma: float = Field(0.1, gt=0, description="[m] of components joined by their shapes")
     joining_turn: float = Field(0.01, gt=0, description="[rad] of components joined")
@@ -194,7 +191,7 @@ def tracking_covariance(path: Trajectory, step: FloatArray, p: SubmapGraphParame
     held = path.uncertainty
     if held is None or not held.any():
         return np.diag(np.array([p.tracking_sigma, p.tracking_sigma, p.tracking_turn]) ** 2)
-    least, across, turn = (_beyond(each, p.drifted) for each in held.T[:3])
+    least, across, turn = (beyond(each, OPEN_STEP) for each in held.T[:3])
     direction = held[:, 3]
     c, s = np.cos(direction - step[2]), np.sin(direction - step[2])
     axes = np.stack([np.column_stack([c, s]), np.column_stack([-s, c])])
@@ -204,15 +201,3 @@ def tracking_covariance(path: Trajectory, step: FloatArray, p: SubmapGraphParame
     covariance[:2, :2] *= p.drift**2
     covariance[2, 2] = (turn**2).mean()
     return covariance
-
-
-def _beyond(sigmas: FloatArray, drifted: float) -> FloatArray:
-    """(n,) `sigmas` of scans, without what all of them had drifted before they were taken.
-
-    It moves a submap as a whole.
-    """
-    least = sigmas.min()
-    if least <= drifted:
-        return np.minimum(sigmas, OPEN_STEP)
-    beyond = np.minimum(sigmas, OPEN_STEP) ** 2 - min(least, OPEN_STEP) ** 2
-    return np.asarray(np.sqrt(beyond + drifted**2))

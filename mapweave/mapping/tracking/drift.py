@@ -92,27 +92,35 @@ class Surroundings(Protocol):
 
 
 class Drift:
-    """Follows what is not known of where a robot is.
-
-    Attributes
-    ----------
-    covariance
-        (3, 3) of its pose against where its map began [m², rad²], tracking frame.
-    """
+    """Follows what is not known of where a robot is."""
 
     def __init__(self, parameters: DriftParameters) -> None:
         self._p = parameters
         self._scale = np.array([1.0, 1.0, 1.0 / parameters.lever])
         self._old = -1  # the newest point that was mapped before it drifted
         self._lately: deque[_Opened | None] = deque(maxlen=parameters.lately)
-        self.covariance: FloatArray = np.zeros((3, 3))
+        # Since its map began, and since `mark`.
+        self._covariances: FloatArray = np.zeros((2, 3, 3))
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(3, 3) of its pose against where its map began [m², rad²], tracking frame."""
+        return np.asarray(self._covariances[0])
 
     def copy(self) -> Self:
         """Return one that goes on by itself from here."""
         other = type(self)(self._p)
         other._old, other._lately = self._old, self._lately.copy()
-        other.covariance = self.covariance
+        other._covariances = self._covariances
         return other
+
+    def mark(self) -> None:
+        """Note that what was mapped so far is about to be compared with what was mapped before."""
+        self._covariances = np.stack([self._covariances[0], np.zeros((3, 3))])
+
+    def end(self) -> None:
+        """Forget what had drifted at the last `mark`: what was mapped before holds it."""
+        self._covariances = self._covariances[[1, 1]]
 
     def follow(
         self,
@@ -139,7 +147,7 @@ class Drift:
         if self.covariance.any():
             carried = np.eye(3)
             carried[:2, 2] = -step[1], step[0]
-            self.covariance = carried @ self.covariance @ carried.T
+            self._covariances = carried @ self._covariances @ carried.T
         self._return(pose, seen, known)
         opened = self._open(pose, information, seen, known)
         self._lately.append(_Opened(known.newest, pace) if opened else None)
@@ -179,11 +187,13 @@ class Drift:
 
     def _return(self, pose: FloatArray, seen: OrientedPoints, known: Surroundings) -> None:
         """Forget what has drifted along directions in which old surfaces hold `seen` again."""
+        steady = not any(self._lately)
         for direction, sigma in self._axes():
-            if sigma < self._p.forgotten or self._is_back(direction, pose, seen, known):
+            little = steady and sigma < self._p.forgotten
+            if little or self._is_back(direction, pose, seen, known):
                 metric = direction / self._scale**2
                 left = np.eye(3) - np.outer(direction, metric) / (direction @ metric)
-                self.covariance = left @ self.covariance @ left.T
+                self._covariances = left @ self._covariances @ left.T
 
     def _is_back(
         self, direction: FloatArray, pose: FloatArray, seen: OrientedPoints, known: Surroundings
@@ -240,6 +250,6 @@ class Drift:
             (direction[0] ** 2 + direction[1] ** 2) / pace.way**2 + direction[2] ** 2 / pace.turn**2
         )
         metric = direction / self._scale**2
-        drifted = math.sqrt(max(metric @ self.covariance @ metric, 0.0)) / (direction @ metric)
-        more = 2 * drifted * grown + grown**2
-        self.covariance = self.covariance + more * np.outer(direction, direction)
+        squares = np.maximum(np.einsum("i,kij,j->k", metric, self._covariances, metric), 0.0)
+        more = 2 * np.sqrt(squares) / (direction @ metric) * grown + grown**2
+        self._covariances = self._covariances + more[:, None, None] * np.outer(direction, direction)

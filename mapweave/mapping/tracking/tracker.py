@@ -120,6 +120,11 @@ class Tracker:
             return []
         return found
 
+    @property
+    def drift(self) -> Drift:
+        """What is not known of where it is."""
+        return self._drift
+
     def settle(self) -> Found:
         """Believe the scan on probation, and return it with those found with it."""
         found, self._probation, self._before = self._probation, [], None

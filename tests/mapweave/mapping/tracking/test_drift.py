@@ -81,10 +81,27 @@ def test_it_is_over_when_what_was_mapped_before_holds_the_robot_again() -> None:
 
 def test_a_heading_that_has_drifted_moves_places_with_the_way_that_is_driven() -> None:
     drift = Drift(DriftParameters())
-    drift.covariance = np.diag([0.0, 0.0, 0.2**2])
+    drift._covariances = np.tile(np.diag([0.0, 0.0, 0.2**2]), (2, 1, 1))
     held = Endless(9, 99.0)
     drift.follow(np.array([3.0, 0.0]), np.array([3.0, 0.0, 0.0]), np.eye(3), WALL, held, PACE)
     assert drift.covariance[1, 1] ** 0.5 == pytest.approx(3.0 * 0.2)
+
+
+def test_a_slow_robot_drifts_as_well() -> None:
+    slow, drift = Pace(0.004, 0.01), Drift(DriftParameters())
+    for k in range(100):
+        pose = np.array([0.01 * k, 0.0, 0.0])
+        drift.follow(np.zeros(2), pose, LONG, WALL, Endless(9, 99.0), slow)
+    assert drift.covariance[0, 0] ** 0.5 == pytest.approx(100 * slow.way, rel=0.05)
+
+
+def test_a_closed_loop_ends_what_had_drifted_before_and_not_what_has_since() -> None:
+    drift = drifted(40, Endless(9, 99.0))
+    drift.mark()
+    for _ in range(10):
+        drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(9, 99.0), PACE)
+    drift.end()
+    assert drift.covariance[0, 0] ** 0.5 == pytest.approx(10 * PACE.way)
 
 
 def test_a_bare_corridor_is_open_along_and_its_end_is_not() -> None:
