@@ -17,6 +17,15 @@ def carried(path: Trajectory) -> float:
     return 0.0 if held is None or len(held) == 0 else float(held[:, :3:2].max(axis=1).min())
 
 
+def is_near(path: Trajectory, far: float, turned: float) -> bool:
+    """Whether all of a `path` is most likely within `far` [m] and `turned` [rad] of the truth.
+
+    What had drifted farther is not where a closed loop looked for it: a look-alike may be.
+    """
+    held = path.uncertainty
+    return held is None or bool((2 * held[:, :3:2] <= (far, turned)).all())
+
+
 def found_again(path: Trajectory) -> Trajectory:
     """Return a `path` that was found again in a map that had not drifted: it had not, either."""
     if carried(path) <= SURE or path.uncertainty is None:
