@@ -86,7 +86,7 @@ def _set_down(log: Log, share: float, count: int) -> list[Start]:
     truth = load_truth(log, np.array([scan.stamp for scan in scans]))
     first = int(share * len(scans))
     known = map_remembered(f"{log.name} first {share:.0%}", log.path, scans[:first], "r1")
-    mapped = _Mapped(known, truth)
+    mapped = Mapped(known, truth)
     stored = KnownMap.of(known)
     finder = PlaceFinder(stored, PlaceFinderParameters())
     inside = [k for k in range(first, len(scans)) if mapped.has(truth, k)]
@@ -98,7 +98,7 @@ def _set_down(log: Log, share: float, count: int) -> list[Start]:
     return found
 
 
-class _Mapped:
+class Mapped:
     """Where mapped scans are in the known map, and where they were."""
 
     def __init__(self, known: RobotMap, truth: FloatArray) -> None:
@@ -113,16 +113,18 @@ class _Mapped:
 
     def has(self, truth: FloatArray, start: int) -> bool:
         """Whether the first part was where the robot is set down, and drives over 5 m."""
-        pose = truth[start]
-        if not np.isfinite(pose[0]):
+        if not self.faces(truth[start]):
             return False
-        near = np.hypot(*(self._truth[:, :2] - pose[:2]).T) < BEEN
-        facing = np.abs(se2.wrap(self._truth[near, 2] - pose[2])) < FACED
         path = truth[start:][np.isfinite(truth[start:, 0])]
         driven = _driven(path)
         ahead = path[driven <= WITHIN]
         apart = np.hypot(*(self._truth[:, None, :2] - ahead[None, :, :2]).transpose(2, 0, 1))
-        return bool(facing.any() and driven[-1] > FOLLOWED and (apart.min(axis=0) < BEEN).all())
+        return bool(driven[-1] > FOLLOWED and (apart.min(axis=0) < BEEN).all())
+
+    def faces(self, pose: FloatArray) -> bool:
+        """Whether the first part was about a true `pose` (3,), and looked about the same way."""
+        near = np.hypot(*(self._truth[:, :2] - pose[:2]).T) < BEEN
+        return bool((np.abs(se2.wrap(self._truth[near, 2] - pose[2])) < FACED).any())
 
     def error(self, component: int, pose: FloatArray, true: FloatArray) -> tuple[float, float]:
         """Return how far a pose in the known map is off [m], [rad], by the nearest mapped scans.
@@ -147,7 +149,7 @@ def _follow(
     start: int,
     known: KnownMap,
     finder: PlaceFinder,
-    mapped: _Mapped,
+    mapped: Mapped,
 ) -> Start:
     localizer = Localizer(known, searcher=finder)
     driven, found_after = 0.0, None

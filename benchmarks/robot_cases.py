@@ -15,6 +15,7 @@ from mapweave_deploy.sim.lidar import LidarParameters
 from mapweave_deploy.sim.office import office
 from mapweave_deploy.sim.own_body import OwnBodyParameters
 from mapweave_deploy.sim.people import PeopleParameters
+from mapweave_deploy.sim.settings import SETTINGS
 from mapweave_deploy.sim.sweeps import SweepParameters, sweeps
 from mapweave_deploy.sim.trajectories import Tour, TourParameters, drive, plan_tours
 from mapweave_deploy.sim.world import World, box, disc, make_world
@@ -87,6 +88,20 @@ def simulated(seconds: float) -> Iterator[Case]:
         parameters = TourParameters(scan_rate=10.0, speed=0.8)
         around = SweepParameters(lidar=LidarParameters(maximum_range=far))
         yield seen("open", name, world, drive(np.array(way), parameters), around)
+
+
+def worlds(seeds: int) -> Iterator[Case]:
+    """Yield a drive through each built-in world, made from so many seeds."""
+    for name, setting in SETTINGS.items():
+        for seed in range(1, seeds + 1):
+            ground, [place] = setting.places(seed, 1)
+            [tour] = plan_tours(ground, 1, setting.tours, np.random.default_rng([seed, 1]))
+            yield seen(_group(name), f"{name} {seed}", place, tour, setting.sweeps)
+
+
+def _group(world: str) -> str:
+    """Return which bars a world is to clear: in some, nothing tells how far a robot went."""
+    return "open" if world in ("hall", "round") else "world"
 
 
 def office_tour(seed: int, seconds: float) -> tuple[World, Tour]:

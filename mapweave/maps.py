@@ -58,10 +58,11 @@ class Trajectory:
     pose
         (m, 3) sensor poses [m, m, rad].
     uncertainty
-        (m, 4) how well determined each was when it was placed, against what was mapped before:
-        standard deviations of the position in the direction that was held least [m], across it
-        [m], and of the heading [rad]; and that direction [rad], in (-pi/2, pi/2]. Zeros where a
-        pose was given and not found, as that of the first scan. None where it is not known, as in
+        (m, 4) how well determined each was when it was placed, against what was mapped lately, and
+        by what was not known of the way since something held the robot last: standard deviations of
+        the position in the direction that was held least [m], across it [m], and of the heading
+        [rad]; and that direction [rad], in (-pi/2, pi/2]. Zeros where a pose was given and not
+        found, as that of the first scan. None where it is not known, as in
         maps from the network.
     """
 

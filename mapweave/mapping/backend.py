@@ -15,6 +15,7 @@ import numpy as np
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.mapping.component_merging import ComponentMerger, ComponentMergingParameters
+from mapweave.mapping.drifted_paths import SURE, carried, found_again, is_near
 from mapweave.mapping.kidnap_detection import KidnapDetectionParameters, KidnapDetector, Kidnapping
 from mapweave.mapping.loop_closing import LoopCloser, LoopParameters
 from mapweave.mapping.submap_builder import SubmapBuilder, SubmapParameters
@@ -79,12 +80,15 @@ class BackendResult:
         robot jumped meanwhile.
     newest_component
         The highest number of a component that was used, joined since or not.
+    is_held
+        Whether the newest submap was found again in an older one that had not drifted.
     """
 
     component: IntArray
     pose: FloatArray
     renewed: tuple[Submap, ...]
     newest_component: int
+    is_held: bool = False
 
     def applied(self, submaps: Sequence[Submap]) -> list[Submap]:
         """Return `submaps`, those settled so far, at their new poses."""
@@ -160,12 +164,21 @@ class Backend:
         if joints or at is not None:
             self._kidnap_detector.forget()
         submaps = self._loops.close(submaps, compared if at is None and not joints else None)
+        is_held = self._is_held(submaps[-1])
         renewed = [self._refined(submaps, submaps[count + k], part) for k, part in enumerate(parts)]
         self._submaps = [*submaps[:count], *renewed]
         component = np.array([s.component for s in self._submaps])
         poses = np.array([s.pose for s in self._submaps])
         newest = finished.submap.component if at is None else finished.spare
-        return BackendResult(component, poses, tuple(renewed), newest)
+        return BackendResult(component, poses, tuple(renewed), newest, is_held)
+
+    def _is_held(self, newest: Submap) -> bool:
+        """Whether the newest submap is linked with an older one, not the last, that was sure."""
+        p = self._parameters.loops
+        older = [k for k in self._loops.graph.neighbours(newest.id) if k < newest.id - 1]
+        return is_near(newest.trajectory, p.max_drift, p.max_turn) and any(
+            carried(self._submaps[k].trajectory) <= SURE for k in older
+        )
 
     def _departed(
         self, submaps: Sequence[Submap], at: Kidnapping, parts: Sequence[Submap]
@@ -190,7 +203,10 @@ class Backend:
             p.refinement,
         )
         growing = part.growing.moved_to(poses)
-        return replace(newest, map=growing.line_map(), trajectory=growing.trajectory())
+        trajectory = growing.trajectory()
+        if self._is_held(newest):
+            trajectory = found_again(trajectory)
+        return replace(newest, map=growing.line_map(), trajectory=trajectory)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -346,7 +346,7 @@ class Mapper:
         if self._growing.is_empty:
             self._frame = tracked.pose
         local = se2.between(self._frame, tracked.pose)
-        held = pose_uncertainty(tracked.information, self.parameters.uncertainty)
+        held = pose_uncertainty(tracked.information, self.parameters.uncertainty, tracked.drift)
         if seen.scan.index == self._next_index - 1:  # not one that is found again with it
             self._held = held
         held = turn_uncertainty(held, -self._frame[2])
@@ -364,6 +364,7 @@ class Mapper:
         )
         self._finished.append(submap)
         self._unsettled, self._follows = Unsettled(self._growing), True
+        self._tracker.drift.mark()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._merged = {}
         self._version += 1
@@ -383,6 +384,8 @@ class Mapper:
         self._version += 1
         self._newest_component = max(self._newest_component, settled.newest_component)
         if self._follows:
+            if settled.is_held:
+                self._tracker.drift.end()
             after = _end(self._finished[-1])
             self._component = self._finished[-1].component
             moved = se2.compose(after, se2.inverse(before))

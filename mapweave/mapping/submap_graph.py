@@ -14,10 +14,12 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.mapping.continuation import links_to_keep
+from mapweave.mapping.drifted_paths import beyond
 from mapweave.mapping.pose_graph import Constraint, optimise
 from mapweave.maps import Submap, Trajectory
 
 CLOSURE_LENGTH = 2.0  # [m] of tracked path that errs about as much as a closure
+OPEN_STEP = 0.5  # [m], [rad] that a scan counts, however far off it may be
 
 
 class SubmapGraphParameters(BaseModel):
@@ -189,7 +191,8 @@ def tracking_covariance(path: Trajectory, step: FloatArray, p: SubmapGraphParame
     held = path.uncertainty
     if held is None or not held.any():
         return np.diag(np.array([p.tracking_sigma, p.tracking_sigma, p.tracking_turn]) ** 2)
-    least, across, turn, direction = held.T
+    least, across, turn = (beyond(each, OPEN_STEP) for each in held.T[:3])
+    direction = held[:, 3]
     c, s = np.cos(direction - step[2]), np.sin(direction - step[2])
     axes = np.stack([np.column_stack([c, s]), np.column_stack([-s, c])])
     squares = np.stack([least, across]) ** 2

@@ -18,6 +18,8 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.localization.known_map import KnownMap
 from mapweave.mapping.localization.recent_scans import RecentScans, RecentScansParameters
+from mapweave.mapping.localization.scan_finder import ScanFinder, ScanFinderParameters
+from mapweave.mapping.tracking.observation import ObservationParameters, observe
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.matching.verification import coinciding
 from mapweave.parameters import StageParameters, derived
@@ -33,12 +35,17 @@ class PlaceFinderParameters(StageParameters):
 
     fusion: FusionParameters = derived(FusionParameters.of)
     recent: RecentScansParameters = derived(RecentScansParameters.of)
+    scan: ScanFinderParameters = derived(ScanFinderParameters.of)
+    observation: ObservationParameters = derived(ObservationParameters.of)
     min_common: float = Field(6.0, gt=0, description="[m] of wall in common")
     min_overlap: float = Field(
         0.95, gt=0, le=1, description="of the wall that both looked at, the share in common"
     )
     min_explained: float = Field(
         0.7, gt=0, le=1, description="of the wall seen lately, the share that is in the known map"
+    )
+    min_scan: float = Field(
+        0.9, gt=0, le=1, description="of a single scan, the share that is in the known map"
     )
     min_held: float = Field(2.0, gt=0, description="[m] of it across the weakest direction")
     max_rival: float = Field(0.5, gt=0, lt=1, description="score of the next best, as a share")
@@ -114,6 +121,7 @@ class PlaceFinder:
         self._p = p = parameters
         prepared = {k: prepare(lines, p.fusion) for k, lines in known.components.items()}
         self._known = {k: each for k, each in prepared.items() if each is not None}
+        self._scans = ScanFinder(known, p.scan)
         self._found: Place | None = None
 
     def begin(self, search: Search) -> None:
@@ -135,8 +143,16 @@ class PlaceFinder:
         if part is None:
             return None
         if search.near is None:
-            return self._anywhere(part)
+            return self._by_scan(search.recent) or self._anywhere(part)
         return self._about(part, search.near, search.recent.pose)
+
+    def _by_scan(self, recent: RecentScans) -> Place | None:
+        """Look for the newest scan alone."""
+        found = self._scans.find(observe(recent.kept[-1].scan, self._p.observation))
+        p = self._p
+        if found is None or found.worth < p.min_scan or found.common < p.min_common:
+            return None
+        return Place(found.component, se2.compose(found.pose, se2.inverse(recent.pose)))
 
     def _anywhere(self, part: PreparedMap) -> Place | None:
         """Look in all components: a look-alike in any of them is a rival."""

@@ -6,7 +6,7 @@ leap to get to.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -15,6 +15,9 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.local_map import ScanEvidence
+
+NO_DRIFT: FloatArray = np.zeros((3, 3))
+NO_DRIFT.setflags(write=False)
 
 
 class AcceptanceParameters(BaseModel):
@@ -70,6 +73,8 @@ class ScanMatch:
         (3, 3) of `Fit`: which directions are held.
     surprise, leap
         How unlikely the step to it is, for this robot and for any; see `MotionModel`.
+    drift
+        (3, 3) covariance of the robot's pose, by what nothing held before; see `Drift`.
     """
 
     pose: FloatArray
@@ -77,6 +82,7 @@ class ScanMatch:
     information: FloatArray
     surprise: float = 0.0
     leap: float = 0.0
+    drift: FloatArray = field(default_factory=lambda: NO_DRIFT)
 
     def value(self, novelty: float) -> float:
         """Evidence less surprise: corridors leave a direction open, and speed is bounded."""

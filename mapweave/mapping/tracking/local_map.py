@@ -129,6 +129,7 @@ class LocalMap:
         self._known = make_point_map(p.icp.normal_weight, CELL, p.thin, p.keyframes)
         self._viewpoints = make_viewpoints(p.keyframes)
         self._settings = evidence_settings(_settings(p))
+        self._newest = -1
         self._last: FloatArray | None = None
         self._raster: LikelihoodField | None = None
         self._asked: tuple[Scan, tuple[FloatArray, float, float]] | None = None
@@ -137,13 +138,18 @@ class LocalMap:
         """Return one that remembers by itself from now on."""
         other = LocalMap(self._parameters)
         other._known, other._viewpoints = self._known.copy(), self._viewpoints.copy()
-        other._last, other._raster = self._last, self._raster
+        other._last, other._raster, other._newest = self._last, self._raster, self._newest
         return other
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing was remembered yet."""
         return self._last is None
+
+    @property
+    def newest(self) -> int:
+        """The number of the newest point; -1 while there is none."""
+        return self._newest
 
     @property
     def target(self) -> Target:
@@ -162,6 +168,8 @@ class LocalMap:
             return
         placed = oriented.moved(pose)
         self._known.add(placed.points, placed.normals)
+        _, numbers = self._known.find(placed.points, placed.normals, CELL)
+        self._newest = max(self._newest, int(numbers.max(initial=-1)))
         self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
 
@@ -183,6 +191,19 @@ class LocalMap:
         if self._raster is None or np.abs(self._raster.centre - centre[:2]).max() > p.reach:
             self._raster = LikelihoodField.of(self._known.content()[0], centre[:2], p)
         return self._raster
+
+    def explained(
+        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
+    ) -> BoolArray:
+        """(k, n) which `points` lie within `reach` [m] of surfaces, at each of `poses` (k, 3).
+
+        Of those that were seen up to point number `until`.
+        """
+        if until >= self._newest:
+            return self._known.explains(points.points, points.normals, poses, reach)
+        placed = [points.moved(pose) for pose in poses]
+        numbers = [self._known.find(at.points, at.normals, reach)[1] for at in placed]
+        return np.array([(each >= 0) & (each <= until) for each in numbers])
 
     def evidence(
         self, scan: Scan, oriented: OrientedPoints, loose: BoolArray, poses: FloatArray

@@ -44,6 +44,9 @@ class MotionModelParameters(BaseModel):
     turn_sigma: float = Field(
         0.35, gt=0, description="[rad] of a turn against the last one, at the least"
     )
+    unsure: float = Field(
+        0.5, gt=0, description="of its usual step, by which a robot's may be off all the time"
+    )
     uneven: float = Field(
         0.5, gt=0, description="of its usual step, by which any robot's may differ at the least"
     )
@@ -128,6 +131,16 @@ class MotionModel:
         if len(alike) < p.enough:
             return self._last[0], self._last[1], p.max_sigma
         return median([x for x, _ in alike]), median([y for _, y in alike]), self._sigma
+
+    def unknown(self, turn: float) -> tuple[float, float]:
+        """Return what is not known of a step with `turn` [rad] that nothing holds: [m], [rad].
+
+        It is more than steps differ by: a robot that stops is wrongly expected again and again.
+        """
+        p = self._p
+        if len(self._alike(turn)) < p.enough:
+            return p.max_sigma, self._turn_sigma
+        return p.unsure * math.hypot(*self.way(turn)[:2]), self._turn_sigma
 
     @property
     def is_paced(self) -> bool:

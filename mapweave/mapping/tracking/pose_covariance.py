@@ -1,7 +1,7 @@
 """How well determined a pose is, per direction: what ICP held it by, in metres and radians.
 
 Along a corridor's walls nothing holds a scan; across them they do. The error that is told is that
-of a scan against what was mapped lately, not what adds up over a path.
+of a scan against what was mapped lately, and what adds up where nothing holds it; see `Drift`.
 """
 
 import math
@@ -39,7 +39,9 @@ class PoseCovarianceParameters(StageParameters):
 
 
 def pose_uncertainty(
-    information: FloatArray, parameters: PoseCovarianceParameters | None = None
+    information: FloatArray,
+    parameters: PoseCovarianceParameters | None = None,
+    drift: FloatArray | None = None,
 ) -> FloatArray:
     """Return (4,) standard deviations of a pose, and where the weakest points.
 
@@ -48,6 +50,8 @@ def pose_uncertainty(
     information
         (3, 3) of `Fit`: x, y and heading in units of one point, any frame. All zero where
         nothing was aligned, as for the scan that defines the frame: then it is `EXACT`.
+    drift
+        (3, 3) covariance of what it was aligned to, same frame; see `Drift`.
 
     Returns
     -------
@@ -60,6 +64,8 @@ def pose_uncertainty(
     p = parameters or PoseCovarianceParameters()
     xx, xy, yy, turn = _covariance(information, p)
     spread = np.array([[xx + p.floor**2, xy], [xy, yy + p.floor**2]])
+    if drift is not None:
+        spread, turn = spread + drift[:2, :2], turn + float(drift[2, 2])
     across, along, least = ellipse(spread)
     return np.array(
         [math.sqrt(along), math.sqrt(across), math.hypot(turn**0.5, p.turn_floor), least]

@@ -6,9 +6,12 @@ What a robot can do bounds where it is believed to be; what it usually does, how
 import math
 from typing import NamedTuple
 
+from mapweave.mapping.tracking.drift import Pace
 from mapweave.mapping.tracking.motion_model import MotionModel
 from mapweave.mapping.tracking.reachability import Reachability
 from mapweave.scan.scan import Scan
+
+LEAST = 1e-3  # [m], [rad] that no step is known better than
 
 
 class Reach(NamedTuple):
@@ -50,3 +53,11 @@ def reach(
     if not timed:
         return Reach(min(untold, paced), paced)
     return Reach(min(reachability.way(since), paced if missed else max(untold, paced)), paced)
+
+
+def pace(scan: Scan, turn: float, motion: MotionModel, reachability: Reachability) -> Pace:
+    """Return what is not known of a step with a `turn` [rad] where nothing seen holds it."""
+    since = reachability.since_placed(scan)
+    far, turned = reachability.most(since)
+    way, turning = motion.unknown(turn)
+    return Pace(max(min(way, far), LEAST), max(min(turning, turned), LEAST))

@@ -104,6 +104,10 @@ class Reachability:
         """Return how far [m] a robot comes in a `time` [s]."""
         return self._p.slack + self._p.max_speed * time
 
+    def most(self, time: float) -> tuple[float, float]:
+        """Return how far [m] a robot comes, and turns [rad], in a `time` [s], were poses exact."""
+        return self._p.max_speed * time, self._p.max_turn_rate * time
+
     def allows(self, scan: Scan, poses: FloatArray) -> BoolArray:
         """(k,) whether the robot can have come to each of `poses` (k, 3) by the time of `scan`."""
         return self._within(self._way, scan, poses)

@@ -10,73 +10,38 @@ look first, and what would surprise least, but what was seen decides.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
-    AcceptanceParameters,
     ScanMatch,
     is_acceptable,
     is_ambiguous,
     is_credible,
     tell_apart,
 )
-from mapweave.mapping.tracking.local_map import LocalMap, LocalMapParameters, ScanEvidence
-from mapweave.mapping.tracking.motion_model import MotionModel, MotionModelParameters
+from mapweave.mapping.tracking.drift import Drift
+from mapweave.mapping.tracking.local_map import LocalMap, ScanEvidence
+from mapweave.mapping.tracking.motion_model import MotionModel
 from mapweave.mapping.tracking.observation import Observation
-from mapweave.mapping.tracking.reach import Reach, reach
-from mapweave.mapping.tracking.reachability import Reachability, ReachabilityParameters
+from mapweave.mapping.tracking.reach import Reach, pace, reach
+from mapweave.mapping.tracking.reachability import Reachability
 from mapweave.mapping.tracking.shape_starts import shape_starts
+from mapweave.mapping.tracking.tracker_parameters import TrackerParameters
 from mapweave.maps import LineMap
 from mapweave.matching.icp import align_all
-from mapweave.parameters import StageParameters, derived
+from mapweave.scan.points import OrientedPoints
 from mapweave.scan.scan import Scan
-from mapweave.shape.correspondence import CorrespondenceParameters
+
+__all__ = ["Found", "Tracker", "TrackerParameters"]
 
 Found = list[tuple[Observation, ScanMatch]]
 EQUAL = 1e-3  # share of the returns by which worth must differ to matter
-
-
-class TrackerParameters(StageParameters):
-    """What the tracker remembers, expects and accepts."""
-
-    local_map: LocalMapParameters = derived(LocalMapParameters.of)
-    correspondence: CorrespondenceParameters = CorrespondenceParameters()
-    motion_model: MotionModelParameters = MotionModelParameters()
-    acceptance: AcceptanceParameters = AcceptanceParameters()
-    reachability: ReachabilityParameters = derived(ReachabilityParameters.of)
-    line_spacing: float = derived(
-        lambda c: c.mapping.resolution, gt=0, description="[m] between points on the map's lines"
-    )
-    max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
-    max_step: float = derived(
-        lambda c: 0.5 + c.robot.max_speed * c.sensor.interval,
-        gt=0,
-        description="[m] between scans that are tracked: driven, and 0.5 m for poses that err",
-    )
-    promising: float = Field(
-        0.6, ge=0, le=1, description="of the best start's support that another must have early"
-    )
-    prior_sigma: float = Field(0.5, gt=0, description="[m] of a prediction, in the alignment")
-    prior_turn: float = Field(0.35, gt=0, description="[rad] the same for the turn")
-    open_novelty: float = Field(
-        0.8, ge=0, le=1, description="what a return at a new place counts along bare walls"
-    )
-    widest: float = Field(
-        4.0, gt=0, description="[m] searched each way, at the most: a keyframe log's longest steps"
-    )
-    open_step: float = Field(0.2, gt=0, description="[m] between places tried")
-    first_window: float = derived(
-        lambda c: min(np.pi, 1.15 / np.pi * c.robot.max_turn_rate * c.sensor.interval),
-        gt=0,
-        description="[rad] half the rotation searched first",
-    )
-    min_points: int = Field(20, ge=3, description="a scan with fewer oriented points is blind")
 
 
 class _State(NamedTuple):
@@ -88,6 +53,7 @@ class _State(NamedTuple):
     odometry: FloatArray | None
     local: LocalMap
     reachability: Reachability
+    drift: Drift
 
 
 class Tracker:
@@ -112,6 +78,7 @@ class Tracker:
         self._odometry: FloatArray | None = None
         self._local = LocalMap(self.parameters.local_map)
         self._reachability = Reachability(self.parameters.reachability)
+        self._drift = Drift(self.parameters.drift)
         self._before: _State | None = None  # of the scan on probation
         self._probation: Found = []
 
@@ -153,6 +120,11 @@ class Tracker:
             return []
         return found
 
+    @property
+    def drift(self) -> Drift:
+        """What is not known of where it is."""
+        return self._drift
+
     def settle(self) -> Found:
         """Believe the scan on probation, and return it with those found with it."""
         found, self._probation, self._before = self._probation, [], None
@@ -162,8 +134,9 @@ class Tracker:
         """Forget the scan on probation, if any: it is missed, as those after it are."""
         if self._before is not None:
             since = [self._probation[0][0], *self.missed]
-            self.pose, missed, self._motion, self._odometry, self._local, at = self._before
-            self.missed, self._reachability = [*missed, *since], at
+            self.pose, missed, self._motion, self._odometry, self._local, *_ = before = self._before
+            self._reachability, self._drift = before.reachability, before.drift
+            self.missed = [*missed, *since]
         self._before, self._probation = None, []
 
     def is_blind(self, seen: Observation) -> bool:
@@ -181,8 +154,9 @@ class Tracker:
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
-        copies = self._motion.copy(), self._odometry, self._local.copy(), self._reachability.copy()
-        return _State(self.pose, self.missed.copy(), *copies)
+        copies = self._motion.copy(), self._odometry, self._local.copy()
+        others = self._reachability.copy(), self._drift.copy()
+        return _State(self.pose, self.missed.copy(), *copies, *others)
 
     def _follow(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
         """Go on to `seen`, where it is; miss it, where that is nowhere."""
@@ -190,13 +164,29 @@ class Tracker:
         if tracked is None:
             self.missed.append(seen)
             return []
-        if not (self._local.is_empty or self.missed):
-            self._motion.add(se2.between(self.pose, tracked.pose), tracked.information)
+        if not self._local.is_empty:
+            tracked = self._drifted(seen, tracked)
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
         self._reachability.placed(seen.scan, tracked.pose)
         self._local.remember(seen.scan, seen.walls, tracked.pose)
         return [(seen, tracked), *self._found_again(seen.scan)]
+
+    def _drifted(self, seen: Observation, tracked: ScanMatch) -> ScanMatch:
+        """Note a step, and how far it may be off; return the scan where it ends, with that."""
+        step = se2.between(self.pose, tracked.pose)
+        unknown = pace(seen.scan, float(step[2]), self._motion, self._reachability)
+        is_open = self._drift.follow(
+            (tracked.pose - self.pose)[:2],
+            tracked.pose,
+            tracked.information,
+            self._thinned(seen),
+            self._local,
+            unknown,
+        )
+        if not self.missed:
+            self._motion.add(step, np.zeros((3, 3)) if is_open else tracked.information)
+        return replace(tracked, drift=self._drift.covariance)
 
     def _found_again(self, last: Scan) -> Found:
         """Try the scans that were missed before the `last` one, from there backwards."""
@@ -329,20 +319,22 @@ class Tracker:
         if len(starts) == 0:
             return []
         p = self.parameters
-        oriented = seen.oriented
-        stride = 1 + (len(oriented) - 1) // p.max_points
-        thinned = oriented.at(slice(None, None, stride))
+        oriented, thinned = seen.oriented, self._thinned(seen)
         fits = align_all(
             thinned, self._local.target, starts, p.local_map.icp, self._prior, share=p.promising
         )
         poses = np.array([fit.pose for fit in fits])
         judged = self._local.evidence(seen.scan, oriented, seen.loose[: len(oriented)], poses)
         since = len(self.missed), self._told(seen.scan)
-        steps = se2.between(self.pose, poses)
+        steps, drift = se2.between(self.pose, poses), self._drift.covariance
         return [
-            ScanMatch(fit.pose, evidence, fit.information, *self._motion.judge(step, *since))
+            ScanMatch(fit.pose, evidence, fit.information, *self._motion.judge(step, *since), drift)
             for fit, evidence, step in zip(fits, judged, steps, strict=True)
         ]
+
+    def _thinned(self, seen: Observation) -> OrientedPoints:
+        stride = 1 + (len(seen.oriented) - 1) // self.parameters.max_points
+        return seen.oriented.at(slice(None, None, stride))
 
 
 def _first() -> ScanMatch:

@@ -1,0 +1,158 @@
+"""Where one scan alone is in a known map, looked for everywhere in some hundredths of a second.
+
+A scan is a line map of its own, with the free space that it saw: coarse to fine it is laid into
+each component, at each turn at which much wall is parallel. Where its returns lie decides: on known
+walls, or where the map was seen through; and known walls that the scan sees through. A look-alike
+is a rival: by how much a place must be ahead of it grows with what the place leaves unexplained.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
+from mapweave.mapping.localization.known_map import KnownMap
+from mapweave.mapping.tracking.observation import Observation
+from mapweave.maps import LineMap
+from mapweave.matching.coarse_places import CoarseMap, CoarsePlaceParameters, coarse_places
+from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.matching.hypotheses import HypothesisParameters, different
+from mapweave.matching.icp import IcpParameters, Target, align_all
+from mapweave.matching.verification import VerificationParameters, verify
+from mapweave.parameters import StageParameters, derived
+from mapweave.scan.free_space import FreeSpaceParameters, rings, seen_free
+from mapweave.scan.points import OrientedPoints
+from mapweave.scan.visibility import sights_of
+
+
+class ScanFinderParameters(StageParameters):
+    """How a scan is looked for, and what a place must show to be the one.
+
+    Set on scans of the later parts of fr079, Intel and CSAIL, in maps of the first
+    (``python -m benchmarks localize``).
+    """
+
+    raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)
+    coarse: CoarsePlaceParameters = derived(
+        lambda c: CoarsePlaceParameters.of(c, shifts=40, aligned=80)
+    )
+    verification: VerificationParameters = derived(VerificationParameters.of)
+    free_space: FreeSpaceParameters = derived(FreeSpaceParameters.of)
+    icp: IcpParameters = derived(IcpParameters.of)
+    distinct: HypothesisParameters = derived(
+        lambda c: HypothesisParameters.of(c, count=12, distance=0.3, turn=0.1)
+    )
+    points: int = Field(180, ge=10, description="of the scan, in the alignment")
+    explained: float = derived(
+        lambda c: 0.6 * c.mapping.closeness,
+        gt=0,
+        description="[m] of a known wall within which a return is explained",
+    )
+    roughly: float = derived(
+        lambda c: 0.8 * c.mapping.closeness, gt=0, description="[m] the same before it is aligned"
+    )
+    weight: float = Field(
+        0.5, ge=0, description="share of the returns that counts as much as all wall contradicted"
+    )
+    least: float = Field(0.5, gt=0, le=1, description="worth of a place, in shares of the returns")
+    least_wall: float = Field(2.0, gt=0, description="[m] of wall that the scan shows, in common")
+    lead: float = Field(0.03, gt=0, description="share of the returns before the next best place")
+    lead_share: float = Field(
+        0.3, ge=0, description="of what the place leaves unexplained, that it leads by besides"
+    )
+    apart: float = Field(0.5, gt=0, description="[m] between rivals")
+    apart_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+
+
+class ScanPlace(NamedTuple):
+    """Where a scan may be: in which component, its pose (3,) there, and what that is worth."""
+
+    component: int
+    pose: FloatArray
+    worth: float
+    common: float
+
+
+class _Known(NamedTuple):
+    """A component as it is looked in."""
+
+    lines: LineMap
+    coarse: CoarseMap
+    field: DistanceField
+    target: Target
+
+
+class ScanFinder:
+    """Looks for single scans in a `known` map."""
+
+    def __init__(self, known: KnownMap, parameters: ScanFinderParameters | None = None) -> None:
+        self._p = p = parameters or ScanFinderParameters()
+        self._known: dict[int, _Known] = {}
+        for number, lines in known.components.items():
+            if len(lines.segments):
+                field = DistanceField.of(lines, p.raster)
+                coarse = CoarseMap.of(lines, p.coarse, p.verification)
+                target = Target.of(field.oriented, p.icp)
+                self._known[number] = _Known(lines, coarse, field, target)
+
+    def find(self, seen: Observation) -> ScanPlace | None:
+        """Return where a scan is, if no other place is about as good."""
+        p, lines = self._p, self._lines(seen)
+        if len(lines.segments) == 0 or len(seen.oriented) == 0:
+            return None
+        places = sorted(self._places(seen.oriented, lines), key=lambda each: -each.worth)
+        if not places:
+            return None
+        best = places[0]
+        rival = max((t.worth for t in places[1:] if self._differs(best, t)), default=-1.0)
+        lead = p.lead + p.lead_share * (1.0 - best.worth)
+        proven = best.worth >= max(p.least, rival + lead) and best.common >= p.least_wall
+        return best if proven else None
+
+    def _lines(self, seen: Observation) -> LineMap:
+        """Return the scan as a line map in its own frame, with the free space that it saw."""
+        p, lines = self._p.free_space, seen.lines
+        free = seen_free(sights_of([seen.scan], np.zeros((1, 3)), p.sight), p)
+        support = np.full(len(lines.segments), self._p.raster.full_support)
+        return LineMap(lines.segments, lines.polyline, support, rings(free))
+
+    def _places(self, oriented: OrientedPoints, lines: LineMap) -> Iterable[ScanPlace]:
+        """Yield the places in all components that are worth most, aligned."""
+        p = self._p
+        coarse = CoarseMap.of(lines, p.coarse, p.verification)
+        field = DistanceField.of(lines, p.raster)
+        thinned = oriented.at(slice(None, None, 1 + (len(oriented) - 1) // p.points))
+        middle = thinned.points.mean(axis=0)
+        for number, known in self._known.items():
+            likely = coarse_places(
+                (known.lines, known.coarse), (lines, coarse), p.coarse, p.verification
+            ).aligned
+            if len(likely) == 0:
+                continue
+            shares = self._shares(thinned, known, likely, p.roughly)
+            best = different(likely, shares, middle, p.distinct)
+            for fit in align_all(thinned, known.target, likely[best], p.icp):
+                verdict = verify(known.field, field, fit.pose, p.verification)
+                against = verdict.contradicted / max(verdict.common + verdict.contradicted, 1e-9)
+                share = float(self._shares(oriented, known, fit.pose[None], p.explained)[0])
+                yield ScanPlace(number, fit.pose, share - p.weight * against, verdict.common)
+
+    def _shares(
+        self, oriented: OrientedPoints, known: _Known, poses: FloatArray, explained: float
+    ) -> FloatArray:
+        """(k,) share of the returns `explained` [m] by walls, less that where space was free."""
+        p = self._p
+        placed = np.stack([se2.transform_points(pose, oriented.points) for pose in poses])
+        _, distance, depth = known.field.look_up(placed)
+        denied = (depth > p.verification.clearance) & (distance > p.verification.closeness)
+        return np.asarray((distance < explained).mean(axis=1) - denied.mean(axis=1))
+
+    def _differs(self, best: ScanPlace, other: ScanPlace) -> bool:
+        """Whether two places are not one, found twice."""
+        if best.component != other.component:
+            return True
+        x, y, turn = se2.between(best.pose, other.pose).tolist()
+        return bool(np.hypot(x, y) > self._p.apart or abs(turn) > self._p.apart_turn)

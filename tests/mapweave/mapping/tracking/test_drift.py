@@ -1,0 +1,125 @@
+"""What nothing holds is known as open: it adds up, until what was mapped before holds it again."""
+
+import numpy as np
+import pytest
+
+from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.tracking.drift import Drift, DriftParameters, Pace
+from mapweave.maps import RobotMap
+from mapweave.scan.points import OrientedPoints
+from mapweave.scan.scan import Scan
+from tests.mapweave.buildings import AROUND, rectangle, walls_of
+from tests.mapweave.mapping.drives import scans_at, straight
+
+SAID, SAID_TURN = 0.25, np.radians(5.0)
+PACE = Pace(0.05, 0.1)
+AHEAD: FloatArray = np.column_stack([np.linspace(-2, 2, 80), np.ones(80)])
+BESIDE: FloatArray = np.tile([0.0, -1.0], (80, 1))
+WALL = OrientedPoints(AHEAD, BESIDE, np.zeros(80, dtype=np.int64))
+HELD: FloatArray = np.diag([60.0, 60.0, 500.0])
+LONG: FloatArray = np.diag([0.0, 60.0, 500.0])  # a wall along x
+
+
+class Endless:
+    """A wall along x, of which the first points end at x = `end` [m] and at -`end`."""
+
+    def __init__(self, newest: int, end: float, *, known_end: bool = False) -> None:
+        self.newest, self._end, self._known_end = newest, end, known_end
+
+    def explained(
+        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
+    ) -> BoolArray:
+        """See `Surroundings`: what is newer goes on for ever, or ends there as well."""
+        assert reach < 1.0
+        x = points.points[:, 0] + poses[:, :1]
+        ends = self._known_end or until < self.newest
+        return np.abs(x) < self._end if ends else np.ones_like(x, dtype=np.bool_)
+
+
+def told(robot_map: RobotMap) -> FloatArray:
+    """Return (n, 4) how surely each scan was placed, in the order of the log."""
+    return np.concatenate([np.asarray(s.trajectory.uncertainty) for s in robot_map.submaps])
+
+
+def mapped(scans: list[Scan]) -> FloatArray:
+    mapper = Mapper("a")
+    for scan in scans:
+        mapper.add(scan)
+    return told(mapper.finish())
+
+
+def drifted(scans: int, known: Endless) -> Drift:
+    drift = Drift(DriftParameters())
+    for k in range(scans):
+        drift.follow(np.zeros(2), np.array([0.1 * k, 0.0, 0.0]), LONG, WALL, known, PACE)
+    return drift
+
+
+@pytest.mark.parametrize("scans", [20, 200])
+def test_along_a_bare_wall_what_is_not_known_of_each_step_adds_up_without_end(scans: int) -> None:
+    covariance = drifted(scans, Endless(9, 99.0)).covariance
+    assert covariance[0, 0] ** 0.5 == pytest.approx(scans * PACE.way, rel=0.05)
+    assert covariance[1, 1] < 1e-9
+    assert covariance[2, 2] < 1e-9
+
+
+def test_one_scan_or_two_that_nothing_holds_are_no_drift() -> None:
+    assert not drifted(2, Endless(9, 99.0)).covariance.any()
+    assert drifted(3, Endless(9, 99.0)).covariance.any()
+
+
+def test_it_is_over_when_what_was_mapped_before_holds_the_robot_again() -> None:
+    drift = drifted(40, Endless(9, 99.0))
+    meanwhile = Endless(20, 2.0), Endless(20, 99.0, known_end=True)
+    for known in meanwhile:  # what was mapped since goes on, or nothing ends
+        drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, known, PACE)
+        assert drift.covariance.any()
+    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, Endless(20, 2.0, known_end=True), PACE)
+    assert not drift.covariance.any()
+
+
+def test_a_heading_that_has_drifted_moves_places_with_the_way_that_is_driven() -> None:
+    drift = Drift(DriftParameters())
+    drift._covariances = np.tile(np.diag([0.0, 0.0, 0.2**2]), (2, 1, 1))
+    held = Endless(9, 99.0)
+    drift.follow(np.array([3.0, 0.0]), np.array([3.0, 0.0, 0.0]), np.eye(3), WALL, held, PACE)
+    assert drift.covariance[1, 1] ** 0.5 == pytest.approx(3.0 * 0.2)
+
+
+def test_a_slow_robot_drifts_as_well() -> None:
+    slow, drift = Pace(0.004, 0.01), Drift(DriftParameters())
+    for k in range(100):
+        pose = np.array([0.01 * k, 0.0, 0.0])
+        drift.follow(np.zeros(2), pose, LONG, WALL, Endless(9, 99.0), slow)
+    assert drift.covariance[0, 0] ** 0.5 == pytest.approx(100 * slow.way, rel=0.05)
+
+
+def test_a_closed_loop_ends_what_had_drifted_before_and_not_what_has_since() -> None:
+    drift = drifted(40, Endless(9, 99.0))
+    drift.mark()
+    for _ in range(10):
+        drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(9, 99.0), PACE)
+    drift.end()
+    assert drift.covariance[0, 0] ** 0.5 == pytest.approx(10 * PACE.way)
+
+
+def test_a_bare_corridor_is_open_along_and_its_end_is_not() -> None:
+    way = straight(np.array([0.0, 0.0]), np.array([24.0, 0.0]), 0.1)
+    corridor = walls_of(rectangle(-30, -1, 60, 1.2))
+    bare = mapped(scans_at(corridor, way, 0.25, max_range=6.0))
+    assert bare[-1, 0] > 4.0
+    assert abs(np.sin(bare[-1, 3])) < np.sin(np.radians(10))
+    short = walls_of(rectangle(-8, -1, 26, 1.2))
+    ended = mapped(scans_at(short, way[:100], 0.25, max_range=90.0))
+    assert (ended[:, 0] < SAID).all()
+
+
+def test_in_a_round_room_the_heading_is_open_and_in_a_square_one_it_is_not() -> None:
+    turns = np.linspace(0, 2, 60)
+    way = np.column_stack([2 * np.cos(turns), 2 * np.sin(turns), turns + np.pi / 2])
+    corners = np.linspace(0, 2 * np.pi, 240, endpoint=False)
+    round_room = walls_of(4 * np.column_stack([np.cos(corners), np.sin(corners)]))
+    assert mapped(scans_at(round_room, way, 0.1, angles=AROUND))[-1, 2] > 2 * SAID_TURN
+    square = mapped(scans_at(walls_of(rectangle(-4, -4, 4, 3.5)), way, 0.1, angles=AROUND))
+    assert (square[:, 2] < SAID_TURN).all()
