@@ -29,7 +29,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def test_a_label_in_letters_that_no_font_has_is_no_warning(rng: Generator, tmp_path: Path) -> None:
-    draw_map(robot_map("a", rng), tmp_path / "map.png", title="\u65e5\u672c")  # warnings are errors
+    draw_map(robot_map(rng), tmp_path / "map.png", title="\u65e5\u672c")  # warnings are errors
 
 
 def svg(path: Path) -> ET.Element:
