@@ -3,6 +3,8 @@
 Nothing is imported before Ctrl-C is heard: pressed early it ends the program without a trace.
 """
 
+import io
+import os
 import signal
 import sys
 
@@ -11,8 +13,23 @@ if _HEARD:  # not where a shell started it in the background
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def _ready_streams() -> None:
+    """Fill what was closed, and let no output fail for a letter that a terminal does not have.
+
+    The next file that is opened would be taken for the stream that was closed.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            empty = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(empty, True)
+            setattr(sys, name, open(empty, "w" if number else "r"))  # noqa: PTH123, SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
+
+
 def main() -> int:
     """Run the program and return its exit status."""
+    _ready_streams()
     from mapweave import cli
 
     if _HEARD:

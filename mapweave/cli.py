@@ -177,6 +177,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    _check_folder()
     points = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
     if words and words[0] == "--version":
         print(f"mapweave {version('mapweave')}")  # noqa: T201
@@ -194,6 +195,14 @@ def _run(words: list[str]) -> int:
     if told := missing():
         print(f"mapweave: {told}", file=sys.stderr)  # noqa: T201
     return command.run(options)
+
+
+def _check_folder() -> None:
+    try:
+        Path.cwd()
+    except FileNotFoundError as error:
+        problem = "the folder this runs in is gone; change to one that is there"
+        raise MapweaveError(problem) from error
 
 
 def _report(words: list[str]) -> int:

@@ -50,6 +50,11 @@ _SENTENCES = {
 _MATCH = "{:.0f} m of wall in common, {:.1f} m contradicted"
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number of things for a person: 1 submap, 2 submaps."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def percent(probability: float) -> str:
     """Return a probability for a person; what would round to 100 % is not certain all the same."""
     return "over 99%" if probability >= 0.995 else f"{probability:.0%}"

@@ -32,6 +32,7 @@ from mapweave.mapping.mapper import Mapper
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import RobotMap
 from mapweave.pictures.picture import check_picture_suffix, plot
+from mapweave.text import counted
 
 ROBOT = "r1"
 
@@ -192,10 +193,12 @@ def _figures(robot_map: RobotMap, taken: int) -> dict[str, float]:
 
 
 def _sentence(figures: dict[str, float]) -> str:
+    parts = counted(int(figures["components"]), "component")
+    lines = counted(int(figures["segments"]), "segment")
     return (
-        "{placed} of {scans} scans placed, {largest} in the largest of {components} components;"
-        " {path_m:.0f} m of path, {submaps} submaps, {segments} segments"
-    ).format(**figures)
+        "{placed} of {scans} scans placed, {largest} in the largest of {parts}; {path_m:.0f} m of"
+        " path, {pieces}, {lines}"
+    ).format(**figures, parts=parts, pieces=counted(int(figures["submaps"]), "submap"), lines=lines)
 
 
 command = Command(

@@ -6,6 +6,7 @@ There are no axes: nobody reads coordinates off a floor plan, and the scale bar 
 
 import math
 import textwrap
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +94,12 @@ def save(figure: Figure, path: Path, kind: str) -> None:
     """Write `figure` as `kind`, ``svg`` or ``png``: the same bytes for the same figure."""
     # matplotlib would sign with its version and the date, and name svg parts at random.
     metadata = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}[kind]
-    with rc_context({"svg.hashsalt": "mapweave", "svg.fonttype": "none"}):
+    with (
+        rc_context({"svg.hashsalt": "mapweave", "svg.fonttype": "none"}),
+        warnings.catch_warnings(),
+    ):
+        # A label in letters that no font here has: a picture shows boxes, and all else is right.
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         figure.savefig(path, format=kind, metadata=metadata)
 
 

@@ -14,6 +14,9 @@ from mapweave.geometry.arrays import BoolArray, FloatArray
 UNNUMBERED = -1
 """The index of a scan that belongs to no log: who maps it counts."""
 
+MAX_STAMP = 1e11
+"""[s]; an overflown clock says nothing, and the time is not known."""
+
 _TURN = 2 * math.pi
 _LAST_INDEX = 2**53  # that a file holds
 
@@ -223,11 +226,11 @@ def _index(value: int) -> int:
 
 
 def _stamp(value: float) -> float:
-    """Return `value` [s], NaN where it is not finite; ArgumentError if it is no number."""
+    """Return `value` [s], NaN where it tells no time; ArgumentError if it is no number."""
     stamp = as_numbers("stamp", value, "expected a time [s]")
     if stamp.ndim:
         raise ArgumentError("stamp", f"expected a time [s], got {value!r}")
-    return float(stamp) if np.isfinite(stamp) else math.nan
+    return float(stamp) if abs(stamp) <= MAX_STAMP else math.nan  # False for NaN
 
 
 def _sweep(value: float) -> float:

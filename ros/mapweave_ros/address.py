@@ -51,10 +51,11 @@ class Ros2Address:
         EndpointError
             If an endpoint is not one.
         """
-        topics = name.removeprefix(SCHEME).partition("?")[0]
+        topics, _, settings = name.removeprefix(SCHEME).partition("?")
         lasers = tuple(_laser(name, text) for text in topics.split("+"))
         _check_lasers(name, lasers)
-        return cls(lasers, Ros2Network.parse(name, endpoints, environment))
+        network = Ros2Network.parse(f"{SCHEME}?{settings}", endpoints, environment)
+        return cls(lasers, network)
 
 
 def _laser(name: str, text: str) -> Laser:

@@ -36,7 +36,7 @@ class Ros2NetworkError(MapweaveError):
 
     def __init__(self, word: str, problem: str) -> None:
         super().__init__(
-            f"{word!r}: {problem}; expected ros2:… with, where they differ,"
+            f"{word!r}: {problem}; expected ros2: and, where they differ,"
             " ?connect=ENDPOINT&domain=N&distro=NAME"
         )
         self.word = word

@@ -61,7 +61,10 @@ class Ros2Network:
         EndpointError
             If an endpoint is not one.
         """
-        settings = dict(parse_qsl(word.partition("?")[2], keep_blank_values=True))
+        scheme, _, rest = word.partition("?")
+        if scheme != SCHEME:
+            raise Ros2NetworkError(word, f"{scheme!r} is not {SCHEME}")
+        settings = dict(parse_qsl(rest, keep_blank_values=True))
         unknown = sorted(settings.keys() - _SETTINGS)
         if unknown:
             raise Ros2NetworkError(word, f"nothing is known of {unknown[0]!r}")

@@ -1,5 +1,6 @@
 """The program finds its subcommands by entry point, and turns errors into a line and a status."""
 
+import json
 import os
 import re
 import signal
@@ -172,6 +173,49 @@ def test_a_reader_that_has_gone_is_no_traceback(words: list[str]) -> None:
     done = subprocess.run(program, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writing)
     assert done.stderr == ""
+
+
+def test_what_a_terminal_has_no_letters_for_ends_nothing() -> None:
+    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(
+        [MAPWEAVE, "--help"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("usage: mapweave COMMAND ?\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        ("map scans --output map.json >&-", 0),
+        ("map scans --output map.json 2>&-", 0),
+        ("map scans --output map.json <&- >&- 2>&-", 0),
+        ("map - --output map.json <&-", 1),
+    ],
+)
+def test_streams_that_are_closed_are_empty_ones(words: str, status: int, tmp_path: Path) -> None:
+    sweep = {"angle_min": -1.5, "angle_increment": 0.01, "ranges": [2.0] * 300}
+    (tmp_path / "scans").write_text(json.dumps(sweep))
+    line = f"{MAPWEAVE} {words}"
+    done = subprocess.run(
+        ["sh", "-c", line], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == status
+    assert (tmp_path / "map.json").exists() == (status == 0)
+    assert "Traceback" not in done.stderr
+    if status:
+        assert done.stderr.startswith("mapweave: standard input: is empty")
+
+
+def test_in_a_folder_that_is_gone_one_line_says_so(tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    line = f"cd {folder}; rmdir {folder}; {MAPWEAVE} map ../scans"
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == (
+        "mapweave: the folder this runs in is gone; change to one that is there\n"
+    )
 
 
 def test_a_defect_is_not_hidden(offer: Callable[[str], None]) -> None:

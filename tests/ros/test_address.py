@@ -49,6 +49,12 @@ def test_what_names_no_laser_is_refused_in_one_line(word: str, problem: str) -> 
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize("word", ["", "foo", "ros2", "ros1:", "ros2:/scan", "ros2:x?domain=1"])
+def test_what_is_no_network_is_refused_rather_than_taken_for_the_teams(word: str) -> None:
+    with pytest.raises(Ros2NetworkError, match=r"expected ros2: and"):
+        Ros2Network.parse(word, ["tcp/router:7447"], {})
+
+
 def test_humble_names_no_hashes() -> None:
     assert not Ros2Network.parse("ros2:?distro=humble", environment={}).hashed
     assert Ros2Network.parse("ros2:", environment={}).hashed

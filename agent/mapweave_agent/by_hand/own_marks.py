@@ -13,7 +13,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Submap
 from mapweave.marks import MAX_LABEL, Anchor, Mark
 from mapweave_protocol.wire.messages import MapVersion, MarksMessage
-from mapweave_protocol.wire.model import WORLD_REACH
+from mapweave_protocol.wire.model import ORDER_REACH
 from mapweave_protocol.wire.orders.marks_message import MAX_MARKS
 from mapweave_protocol.wire.orders.order_message import new_order_id
 
@@ -129,8 +129,8 @@ def checked(label: str, x: float, y: float, frame: str) -> FloatArray:
 
 
 def _coordinate(name: str, value: float) -> float:
-    expected = f"expected a number of at most {WORLD_REACH:g} [m]"
+    expected = f"expected a number of at most {ORDER_REACH:g} [m]"
     number = as_number(name, value, expected)
-    if abs(number) > WORLD_REACH:
+    if abs(number) > ORDER_REACH:
         raise ArgumentError(name, f"{expected}, got {value!r}")
     return number

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
+from mapweave.text import counted
 from mapweave_deploy.run.team_plan import Member
 from mapweave_protocol.wire.messages import StatusMessage
 
@@ -61,7 +62,7 @@ class Bars:
 
 
 def _words(status: StatusMessage) -> str:
-    return f"{status.scans_placed} placed, {status.submaps} submaps, {status.state}"
+    return f"{status.scans_placed} placed, {counted(status.submaps, 'submap')}, {status.state}"
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mapweave.maps import Alignment, JointComponent, RobotMap
-from mapweave.text import percent
+from mapweave.text import counted, percent
 from mapweave_deploy.run.evaluation import (
     Limits,
     PairEvaluation,
@@ -52,7 +52,7 @@ def _tell_robots(outcome: TeamOutcome, members: Sequence[Member]) -> Iterator[st
         parts = f", {status.components} components" if status.components > 1 else ""
         yield (
             f"  {member.robot}: {status.scans_placed} of {status.scans_seen} scans placed,"
-            f" {status.submaps} submaps{parts}"
+            f" {counted(status.submaps, 'submap')}{parts}"
         )
 
 
@@ -106,7 +106,7 @@ def _tell_components(
     """Yield in how many components the robots are, and what is left over."""
     mains = {main_component(robot_map) for robot_map in outcome.maps.values()}
     homes = [c for c in outcome.joint.components if not mains.isdisjoint(c.robots)]
-    yield f"{len(members)} robots in {len(homes)} component{'' if len(homes) == 1 else 's'}."
+    yield f"{counted(len(members), 'robot')} in {counted(len(homes), 'component')}."
     places = len({member.place for member in members})
     if places > 1 and not any(np.isinf(verdict.distance) for verdict in verdicts):
         yield f"Nothing is joined across the {places} logs."
@@ -121,7 +121,7 @@ def _tell_rest(component: JointComponent, outcome: TeamOutcome) -> str:
     """Tell a component that no robot's main part is in, and how many scans it has."""
     counts = sum(map(scan_counts, outcome.maps.values()), Counter[str]())
     scans = sum(counts[name] for name in component.robots)
-    return f"{' + '.join(sorted(component.robots))} ({scans} scan{'' if scans == 1 else 's'})"
+    return f"{' + '.join(sorted(component.robots))} ({counted(scans, 'scan')})"
 
 
 def _tell_error(verdict: PairEvaluation) -> str:

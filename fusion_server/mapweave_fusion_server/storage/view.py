@@ -7,7 +7,7 @@ from types import TracebackType
 
 from mapweave.atomic import replace_file
 from mapweave.errors import FileError
-from mapweave_fusion_server.storage.database import DamagedError, Database
+from mapweave_fusion_server.storage.database import DamagedError, Database, UnwritableError
 from mapweave_fusion_server.storage.salvage import is_sound
 from mapweave_fusion_server.storage.schema import (
     MESSAGE_TABLES,
@@ -15,6 +15,9 @@ from mapweave_fusion_server.storage.schema import (
     checksum,
     is_missing,
 )
+
+NO_FILE = 0
+"""The inode in a copy that no coordinator has opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +122,20 @@ class StoreView:
         Raises
         ------
         FileError
-            If it cannot be written.
+            If it cannot be written, or something else than an earlier copy is there.
         """
+        if not _may_be_replaced(path):
+            problem = "is no backup of a store, and would be overwritten; expected another name"
+            raise FileError(path, problem)
         with replace_file(path) as temporary:
-            self._database.copy_to(temporary)
+            try:
+                self._database.copy_to(temporary)
+            except UnwritableError as error:
+                raise FileError(path, f"cannot be written: {error.__cause__}") from error
             copy = Database(temporary)
             try:
                 # No file has it, so who opens the copy begins a new series.
-                copy.rows("UPDATE owner SET inode = 0")
+                copy.rows(f"UPDATE owner SET inode = {NO_FILE}")
                 copy.rows("PRAGMA journal_mode = DELETE")
             finally:
                 copy.close()
@@ -150,3 +159,17 @@ class StoreView:
         if schema != SCHEMA_VERSION:
             problem = f"a store of schema {schema}, expected {SCHEMA_VERSION}"
             raise FileError(self.path, f"{problem}: the server brings it up when it opens it")
+
+
+def _may_be_replaced(path: Path) -> bool:
+    """Tell whether there is nothing, or a backup with which no coordinator has gone on."""
+    try:
+        if is_missing(path):
+            return True
+        database = Database(path, read_only=True)
+        try:
+            return database.rows("SELECT inode FROM owner") == [(NO_FILE,)]
+        finally:
+            database.close()
+    except FileError:
+        return False

@@ -72,6 +72,8 @@ def _settings(path: Path) -> _Settings:
         raise MissingExtraError("a map_server grid", "grids") from error
     try:
         content = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        if not isinstance(content, dict):
+            raise FileError(path, f"is no list of settings; {_EXPECTED}")
         return _Settings.model_validate(content)
     except OSError as error:
         raise FileError(path, f"cannot be read ({error.strerror}); {_EXPECTED}") from error

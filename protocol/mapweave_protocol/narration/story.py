@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from mapweave.maps import JointMap, RobotMap, component_name
+from mapweave.text import counted
 from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.narration.story_alignments import AlignmentStory
 from mapweave_protocol.narration.story_joint import JointStory
@@ -128,8 +129,8 @@ class Story:
         if state.submaps >= max(2 * state.told, 1):
             state.told = state.submaps
             yield (
-                f"{robot_map.robot}: {_count(state.submaps, 'submap')}{_pieces(robot_map)},"
-                f" {_count(state.segments, 'segment')}"
+                f"{robot_map.robot}: {counted(state.submaps, 'submap')}{_pieces(robot_map)},"
+                f" {counted(state.segments, 'segment')}"
             )
 
     def aligned(self, message: AlignmentMessage) -> Iterator[str]:
@@ -174,7 +175,3 @@ def _tell_found(before: RobotMap, now: RobotMap) -> Iterator[str]:
 def _pieces(robot_map: RobotMap) -> str:
     parts = len(robot_map.components)
     return f" in {parts} components" if parts > 1 else ""
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

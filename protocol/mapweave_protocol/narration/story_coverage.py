@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mapweave.maps import JointComponent, JointMap, parse_component
+from mapweave.text import counted
 
 if TYPE_CHECKING:
     from mapweave.scan.coverage import Coverage
@@ -46,5 +47,4 @@ def _tell(component: JointComponent, now: Coverage) -> str:
     if not count:
         return f"{searched}, nothing left to search"
     widest = float(np.linalg.norm(np.diff(now.frontiers[0], axis=0), axis=1).sum())
-    places = "1 place" if count == 1 else f"{count} places"
-    return f"{searched}, goes on in {places}, the widest {widest:.1f} m"
+    return f"{searched}, goes on in {counted(count, 'place')}, the widest {widest:.1f} m"

@@ -19,6 +19,7 @@ from mapweave_protocol.link.arguments import add_connection_arguments, connectio
 from mapweave_protocol.link.security.membership import operator_of
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.operator.delivery import PATIENCE
+from mapweave_protocol.wire.model import ORDER_REACH
 
 NAME_VARIABLE = "MAPWEAVE_OPERATOR"
 _NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{0,9})?"
@@ -98,7 +99,7 @@ def transform(text: str) -> FloatArray:
     if not re.fullmatch(f"{_NUMBER},{_NUMBER},{_NUMBER}", text):
         raise ValueError(f"{text}: expected x,y,degrees [m, m, °], such as 3.5,-1,90")
     x, y, degrees = (float(number) for number in text.split(","))
-    return np.array([x, y, np.radians(degrees)])
+    return np.array([*_within_reach(text, x, y), np.radians(degrees % 360)])
 
 
 def scan_or_place(text: str) -> int | FloatArray:
@@ -113,7 +114,13 @@ def scan_or_place(text: str) -> int | FloatArray:
         return int(text)
     if not re.fullmatch(f"{_NUMBER},{_NUMBER}", text):
         raise ValueError(f"{text}: expected the number of a scan, or x,y [m], such as 3.5,-1")
-    return np.array([float(number) for number in text.split(",")])
+    return np.array(_within_reach(text, *map(float, text.split(","))))
+
+
+def _within_reach(text: str, x: float, y: float) -> tuple[float, float]:
+    if max(abs(x), abs(y)) > ORDER_REACH:
+        raise ValueError(f"{text}: expected places at most {ORDER_REACH:g} m away")
+    return x, y
 
 
 def _reason(text: str) -> str:

@@ -11,6 +11,7 @@ from mapweave.ids import ID_PATTERN, RUN_PATTERN
 from mapweave_protocol.wire.budget import Budget
 
 WORLD_REACH = 1e5  # [m] from a component's origin
+ORDER_REACH = WORLD_REACH / 2  # [m] that is ordered: from a scan's pose it is within the other
 JOINT_REACH = 1e9  # [m]; alignments within WORLD_REACH add up along a chain of components
 MAX_COUNT = 2**53
 MAX_ALIGNMENTS = 4096

@@ -12,7 +12,6 @@ from mapweave.geometry.arrays import FloatArray, IntArray
 PER_METRE = 1e3  # of the poses of submaps: what they hold moves along
 PER_RADIAN = 1e5  # 0.2 mm at 20 m
 HALF_TURN = 314159  # the largest angle that, unpacked, still lies in (-pi, pi]
-MAX_STAMP = 1e11  # [s]; an overflown clock says nothing
 MAX_WHOLE = 2**53
 
 

@@ -83,7 +83,7 @@ def test_nothing_can_be_marked_before_anything_is_mapped() -> None:
     [
         ("", 1.0, "map", "label: expected 1 to 64"),
         ("a\u001b[2J", 1.0, "map", "label: expected 1 to 64"),
-        ("victim", float("nan"), "map", "x: expected a number of at most 100000 .m., got nan"),
+        ("victim", float("nan"), "map", "x: expected a number of at most 50000 .m., got nan"),
         ("victim", float("inf"), "map", "x: expected a number of at most"),
         ("victim", 1.0, "joint", "frame: expected 'map' or 'sensor', got 'joint'"),
     ],

@@ -44,6 +44,13 @@ def joint(version: int, *components: dict[str, list[float]]) -> JointStatusMessa
     )
 
 
+@pytest.mark.parametrize("stamp", [1e11, -1e11, 1e12, 1e308, float("nan")])
+def test_whatever_its_clock_says_a_robot_says_where_it_is(stamp: float) -> None:
+    message = Whereabouts("b", "boot", 0).message(scan(7, stamp), placed(), 5.0)
+    assert message is not None
+    assert message.stamp == (stamp if abs(stamp) <= 1e11 else None)
+
+
 def test_before_the_joint_map_has_its_component_a_robot_is_in_its_own_map_only() -> None:
     message = Whereabouts("r1", "b", 4).message(scan(7), placed(), 9.0)
     assert message is not None

@@ -2,6 +2,7 @@
 
 import json
 import re
+import resource
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -106,6 +107,36 @@ def test_a_backup_is_a_store_of_the_same_versions(run: Run, tmp_path: Path) -> N
     ]
     with Store(tmp_path / "copy.sqlite", "rescue") as copy:
         assert copy.latest_version == 3
+
+
+def test_a_backup_takes_the_place_of_an_earlier_one_and_of_nothing_else(
+    run: Run, tmp_path: Path
+) -> None:
+    copy, other, log = (tmp_path / name for name in ("copy.sqlite", "other.sqlite", "r1.log"))
+    for _ in range(2):
+        run("backup", str(copy))
+    with Store(other, "rescue"):
+        pass
+    log.write_text("FLASER")
+    for path in (other, log):
+        before = path.read_bytes()
+        [line] = run("backup", str(path), status=1)
+        assert line == (
+            f"mapweave: {path}: is no backup of a store, and would be overwritten;"
+            " expected another name"
+        )
+        assert path.read_bytes() == before
+
+
+def test_a_backup_that_finds_no_room_names_the_copy(run: Run, tmp_path: Path) -> None:
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (36864, limit[1]))
+    try:
+        [line] = run("backup", str(tmp_path / "copy.sqlite"), status=1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    assert line.startswith(f"mapweave: {tmp_path / 'copy.sqlite'}: cannot be written: ")
+    assert [path.name for path in tmp_path.glob("copy*")] == []
 
 
 def test_a_version_that_is_not_there_is_told_in_one_line(run: Run, path: Path) -> None:

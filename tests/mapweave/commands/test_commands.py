@@ -101,7 +101,7 @@ def test_a_log_becomes_a_map_file_and_a_line_of_figures(log: Path, tmp_path: Pat
     output = tmp_path / "out.json"
     done = mapweave("map", log, "--robot", "r-7", "--scans", "2:10", "--output", output)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("8 of 8 scans placed, 8 in the largest of 1 components; ")
+    assert done.stdout.startswith("8 of 8 scans placed, 8 in the largest of 1 component; ")
     robot_map = read_map(output)
     assert robot_map.robot == "r-7"
     indices = np.concatenate([s.trajectory.scan_index for s in robot_map.submaps])

@@ -96,7 +96,7 @@ def test_a_log_that_an_engineer_reported_is_mapped_in_one_piece_and_says_what_wa
 ) -> None:
     assert len(poses(run_map(CASES / case / log, tmp_path))) == 40
     done = capsys.readouterr()
-    assert done.out.startswith("40 of 40 scans placed, 40 in the largest of 1 components; ")
+    assert done.out.startswith("40 of 40 scans placed, 40 in the largest of 1 component; ")
     assert done.err.count("\n") == bool(words)
     for word in words:
         assert done.err.count(word) == 1

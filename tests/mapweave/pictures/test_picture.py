@@ -28,6 +28,10 @@ from tests.mapweave.whole_maps import joint_map, robot_map, true_poses
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+def test_a_label_in_letters_that_no_font_has_is_no_warning(rng: Generator, tmp_path: Path) -> None:
+    draw_map(robot_map(rng), tmp_path / "map.png", title="\u65e5\u672c")  # warnings are errors
+
+
 def svg(path: Path) -> ET.Element:
     return ET.parse(path).getroot()
 

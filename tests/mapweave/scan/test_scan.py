@@ -152,7 +152,11 @@ def test_an_index_numbers_a_scan(index: int) -> None:
 def test_a_stamp_is_a_time(stamp: float) -> None:
     with pytest.raises(ArgumentError, match=r"^stamp: expected a time \[s\]"):
         Scan([1, 2], [0, 0.1], stamp=stamp)
-    assert math.isnan(Scan([1, 2], [0, 0.1], stamp=math.inf).stamp)
+
+
+@pytest.mark.parametrize("stamp", [math.inf, math.nan, 1e18, -1.1e11, 1e308])
+def test_a_clock_that_has_overflown_tells_no_time(stamp: float) -> None:
+    assert math.isnan(Scan([1, 2], [0, 0.1], stamp=stamp).stamp)
 
 
 @pytest.mark.parametrize("name", ["angle_min", "angle_increment", "range_min", "range_max"])

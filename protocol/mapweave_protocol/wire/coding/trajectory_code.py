@@ -14,6 +14,7 @@ import numpy as np
 from mapweave.geometry.arrays import IntArray
 from mapweave.kernels.range_coder import Coder
 from mapweave.maps import Trajectory
+from mapweave.scan.scan import MAX_STAMP
 from mapweave_protocol.wire import packing
 from mapweave_protocol.wire.coding.line_code import turned_back
 
@@ -50,7 +51,7 @@ class CodedTrajectory:
         """
         places = packing.quantise(trajectory.pose[:, :2], PER_METRE, reach)
         turns = packing.quantise(trajectory.pose[:, 2], PER_TURN / (2 * np.pi), 1e6) % PER_TURN
-        known = np.abs(trajectory.stamp) <= packing.MAX_STAMP
+        known = np.abs(trajectory.stamp) <= MAX_STAMP
         ticks = np.rint(np.where(known, trajectory.stamp, 0.0) * PER_SECOND).astype(np.int64)
         return cls(np.column_stack([trajectory.scan_index, known, ticks, places, turns]))
 
@@ -112,8 +113,8 @@ def _code_time(
     late = coder.signed(("stamp", first), row[2] - clock.ticks - clock.interval)
     step = clock.interval + late
     clock.ticks += step
-    if abs(clock.ticks) > packing.MAX_STAMP * PER_SECOND:
-        raise ValueError(f"stamp, expected at most {packing.MAX_STAMP:g} s")
+    if abs(clock.ticks) > MAX_STAMP * PER_SECOND:
+        raise ValueError(f"stamp, expected at most {MAX_STAMP:g} s")
     if not first:
         clock.interval = step
     return clock.index, 1, clock.ticks

@@ -110,7 +110,8 @@ def test_the_frame_is_that_of_the_settings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ("", ["expected"]),
+        ("", ["is no list of settings", "expected"]),
+        ("- map.pgm\n", ["is no list of settings", "expected"]),
         ("[1, 2", ["is no YAML", "expected"]),
         ("image: map.pgm\norigin: [0, 0, 0]\n", ["resolution", "required"]),
         (SETTINGS.replace("0.1", "-1"), ["resolution", "greater"]),
