@@ -22,6 +22,7 @@ constexpr int64_t NUMBERS_OF_A_BYTE = 8, NUMBERS_OF_NONE = 1000;
 constexpr uint32_t TOP = 1u << 24;
 
 using Counts = std::array<int32_t, 2>;
+using Beginning = nb::typed<nb::dict, nb::str, nb::object>;
 
 inline int64_t as_number(nb::handle value) {
   const nb::object whole = nb::steal(PyNumber_Index(value.ptr()));
@@ -96,7 +97,7 @@ inline void learn(Counts& counts, int value) {
 template <typename End>
 class Coder {
  public:
-  explicit Coder(nb::dict beginning) : beginning_(std::move(beginning)) {}
+  explicit Coder(Beginning beginning) : beginning_(std::move(beginning)) {}
 
   int64_t numbers() const { return numbers_; }
 
@@ -174,7 +175,7 @@ class Coder {
     return found - 1;
   }
 
-  nb::dict beginning_;
+  Beginning beginning_;
   size_t known_ = 0;
   nb::dict places_;  // of each context in `contexts_`
   std::vector<Context> contexts_;
@@ -182,7 +183,7 @@ class Coder {
 
 class Encoder : public Coder<Encoder> {
  public:
-  Encoder(nb::dict beginning, int64_t limit) : Coder(std::move(beginning)), limit_(limit) {}
+  Encoder(Beginning beginning, int64_t limit) : Coder(std::move(beginning)), limit_(limit) {}
 
   Encoder copy() const { return *this; }
 
@@ -254,7 +255,7 @@ class Encoder : public Coder<Encoder> {
 
 class Decoder : public Coder<Decoder> {
  public:
-  Decoder(nb::bytes data, nb::dict beginning, int64_t allowed)
+  Decoder(nb::bytes data, Beginning beginning, int64_t allowed)
       : Coder(std::move(beginning)), data_(data.c_str(), data.size()), allowed_(allowed) {
     for (int k = 0; k < 4; ++k) code_ = code_ << 8 | next();
   }
@@ -320,12 +321,12 @@ inline void bind_range_coder(nanobind::module_& m) {
   namespace nb = nanobind;
   using namespace range_coder;
   auto encoder = nb::class_<Encoder>(m, "RangeEncoder");
-  encoder.def(nb::init<nb::dict, int64_t>(), nb::arg("beginning"), nb::arg("limit"))
+  encoder.def(nb::init<Beginning, int64_t>(), nb::arg("beginning"), nb::arg("limit"))
       .def("finish", &Encoder::finish)
       .def("copy", &Encoder::copy);
   bind_coder<Encoder>(encoder);
   auto decoder = nb::class_<Decoder>(m, "RangeDecoder");
-  decoder.def(nb::init<nb::bytes, nb::dict, int64_t>(), nb::arg("data"), nb::arg("beginning"),
+  decoder.def(nb::init<nb::bytes, Beginning, int64_t>(), nb::arg("data"), nb::arg("beginning"),
               nb::arg("allowed"));
   bind_coder<Decoder>(decoder);
 }
