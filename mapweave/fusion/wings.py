@@ -32,13 +32,13 @@ class WingParameters(BaseModel):
         gt=0,
         le=1,
         description="of the wall of either map, in common, from which they are nearly the same;"
-        " of 396 right joins of stretches of logs one has as much",
+        " of 367 right joins of stretches of logs one has as much",
     )
     odd: float = Field(
         1.0,
         ge=0,
-        description="[m] of wall in common at odd angles, which prove one place: at least 10 m"
-        " for maps of stretches that share three quarters and more, 1 m of a bare corridor",
+        description="[m] of wall in common at odd angles, which prove one place: right joins of"
+        " stretches that share three quarters and more have 1.5 m at least, equal wings hardly any",
     )
     unique: float = Field(
         0.8, gt=0, le=1, description="probability that a bare wing has no twin within reach"
