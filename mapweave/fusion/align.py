@@ -17,9 +17,9 @@ from mapweave.fusion.component import Component
 from mapweave.fusion.confidence import confidence, may_be
 from mapweave.fusion.decision import Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import holds, reach
-from mapweave.fusion.mirrored import mirrored, told_if_mirrored
+from mapweave.fusion.mirrored import may_be_mirrored, mirrored, told_if_mirrored
 from mapweave.fusion.parameters import FusionParameters, chosen
-from mapweave.fusion.places import compare_at_places, located
+from mapweave.fusion.places import compare_at_places, is_one_place, located
 from mapweave.fusion.rivals import without_its_room
 from mapweave.fusion.rooms import outside
 from mapweave.fusion.wings import unless_one_kind
@@ -102,7 +102,11 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
     if ours is None or theirs is None:
         shapes = [None if window is None else window.shape for window in (ours, theirs)]
         return compare(first.name, shapes[0], second.name, shapes[1], p)
-    whole = compare(first.name, ours.shape, second.name, theirs.shape, p)
+    pair = first.name, ours.shape, second.name, theirs.shape, p
+    told = _told_coarsely(*pair)
+    if told is not None and told.decision == "refused" and is_one_place(ours, theirs, p.places):
+        return told
+    whole = told or compare(*pair, closely=True)
     if whole.decision == "accepted" and _is_rigid(whole, ours.shape, theirs.shape, p):
         return _at_place(located(whole, ours, theirs, p.places), ours.shape, theirs.shape, p)
     found = compare_at_places(
@@ -120,10 +124,11 @@ def _mirrored(first: Component, second: Component, p: FusionParameters) -> Align
     """Compare two components, the second one mirrored, by parallel walls alone."""
     if first.whole is None or second.whole is None:
         return None
-    turned = prepare(mirrored(second.whole.shape.lines), p)
+    ours, theirs = first.whole.shape, second.whole.shape
+    turned = prepare(mirrored(theirs.lines), p) if may_be_mirrored(ours, theirs, p) else None
     if turned is None:
         return None
-    pair = first.name, first.whole.shape, second.name, turned, p
+    pair = first.name, ours, second.name, turned, p
     return _told_coarsely(*pair) or _by_walls(*pair)[0]
 
 

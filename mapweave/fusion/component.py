@@ -52,7 +52,7 @@ class Component:
     @property
     def size(self) -> float:
         """[m] of wall; 0 where it is too little to compare."""
-        return 0.0 if self.whole is None else float(self.whole.shape.raster.weight.sum())
+        return 0.0 if self.whole is None else self.whole.shape.wall
 
     @cached_property
     def middles(self) -> FloatArray:

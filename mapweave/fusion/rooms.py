@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.geometry.extent import longer_sides
+from mapweave.kernels.extent import longer_sides
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import VerificationParameters, coinciding
 

@@ -24,6 +24,7 @@
 #include "shape_index.hpp"
 #include "shifts.hpp"
 #include "slivers.hpp"
+#include "standing.hpp"
 #include "viewpoints.hpp"
 #include "windows.hpp"
 
@@ -53,6 +54,7 @@ NB_MODULE(_compiled, m) {
   bind_shape_index(m);
   bind_shifts(m);  // of the views above
   bind_slivers(m);
+  bind_standing(m);
   bind_viewpoints(m);
   bind_pose_evidence(m);  // of the points and viewpoints above
   bind_windows(m);

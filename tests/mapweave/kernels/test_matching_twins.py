@@ -15,6 +15,7 @@ from mapweave.kernels.matching import (
     marks,
     raster_icp,
     rasters,
+    standing,
     windows,
 )
 
@@ -206,3 +207,23 @@ def test_grids_are_correlated_alike(seed: int, rows: int, count: int) -> None:
     np.testing.assert_array_equal(
         marks.highest(product, count), marks.highest_numpy(product, count)
     )
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, some, st.sampled_from([0.0, CELL / 4, CELL, 1.5 * CELL]))
+def test_the_same_things_stand_free(seed: int, count: int, reach: float) -> None:
+    """Distances of whole cells and limits of as many are told apart alike."""
+    rng = np.random.default_rng(seed)
+    points = np.repeat(some_places(rng, count), 5, axis=0) + rng.uniform(-0.2, 0.2, (5 * count, 2))
+    _, distance = rasters.nearest_samples(points, ORIGIN, CELL, 15, 20)
+    for side in (0.1, 0.4, 1.1):
+        asked = points, ORIGIN, CELL, distance, reach, side
+        found = standing.standing_free(*asked)
+        np.testing.assert_array_equal(found, standing.standing_free_numpy(*asked))
+
+
+@pytest.mark.parametrize("outside", [[-9.0, 0.0], [0.0, 9.0], [np.nan, 0.0]])
+def test_what_stands_outside_of_the_raster_is_refused(outside: list[float]) -> None:
+    distance = np.zeros((15, 20), dtype=np.float32)
+    with pytest.raises(ValueError, match="inside of the raster"):
+        standing.standing_free(np.array([outside]), ORIGIN, CELL, distance, 0.1, 1.0)
