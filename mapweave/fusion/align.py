@@ -43,8 +43,7 @@ from mapweave.reasons import Reason, ReasonKind
 
 __all__ = ["FusionParameters", "align", "align_maps", "compare", "find_alignments", "prepare"]
 
-Fields = tuple[DistanceField, DistanceField]
-"""What two maps are judged by: of the reference, and of the other."""
+Fields = tuple[DistanceField, DistanceField]  # judged by: of the reference, and of the other
 
 
 def align(
@@ -100,8 +99,7 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
     """
     ours, theirs = first.whole, second.whole
     if ours is None or theirs is None:
-        shapes = [None if window is None else window.shape for window in (ours, theirs)]
-        return compare(first.name, shapes[0], second.name, shapes[1], p)
+        return compare(first.name, first.shape, second.name, second.shape, p)
     pair = first.name, ours.shape, second.name, theirs.shape, p
     told = _told_coarsely(*pair)
     if told is not None and told.decision == "refused" and is_one_place(ours, theirs, p.places):
@@ -122,13 +120,10 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
 
 def _mirrored(first: Component, second: Component, p: FusionParameters) -> Alignment | None:
     """Compare two components, the second one mirrored, by parallel walls alone."""
-    if first.whole is None or second.whole is None:
+    ours, theirs = first.shape, second.shape
+    if ours is None or theirs is None or not may_be_mirrored(ours, theirs, p):
         return None
-    ours, theirs = first.whole.shape, second.whole.shape
-    turned = prepare(mirrored(theirs.lines), p) if may_be_mirrored(ours, theirs, p) else None
-    if turned is None:
-        return None
-    pair = first.name, ours, second.name, turned, p
+    pair = first.name, ours, second.name, replace(theirs, lines=mirrored(theirs.lines)), p
     return _told_coarsely(*pair) or _by_walls(*pair)[0]
 
 

@@ -10,6 +10,8 @@
 #include "marks.hpp"
 #include "merging.hpp"
 #include "multiview.hpp"
+#include "nearness.hpp"
+#include "parts.hpp"
 #include "place_views.hpp"
 #include "point_map.hpp"
 #include "polygons.hpp"
@@ -41,6 +43,8 @@ NB_MODULE(_compiled, m) {
   bind_marks(m);
   bind_merging(m);
   bind_multiview(m);
+  bind_nearness(m);
+  bind_parts(m);
   bind_place_views(m);
   bind_point_map(m);
   bind_polygons(m);
