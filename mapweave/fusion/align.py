@@ -17,9 +17,9 @@ from mapweave.fusion.component import Component
 from mapweave.fusion.confidence import confidence, may_be
 from mapweave.fusion.decision import Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import holds, reach
-from mapweave.fusion.mirrored import mirrored, told_if_mirrored
+from mapweave.fusion.mirrored import may_be_mirrored, mirrored, told_if_mirrored
 from mapweave.fusion.parameters import FusionParameters, chosen
-from mapweave.fusion.places import compare_at_places, located
+from mapweave.fusion.places import compare_at_places, is_one_place, located
 from mapweave.fusion.rivals import without_its_room
 from mapweave.fusion.rooms import outside
 from mapweave.fusion.wings import unless_one_kind
@@ -43,8 +43,7 @@ from mapweave.reasons import Reason, ReasonKind
 
 __all__ = ["FusionParameters", "align", "align_maps", "compare", "find_alignments", "prepare"]
 
-Fields = tuple[DistanceField, DistanceField]
-"""What two maps are judged by: of the reference, and of the other."""
+Fields = tuple[DistanceField, DistanceField]  # judged by: of the reference, and of the other
 
 
 def align(
@@ -100,9 +99,12 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
     """
     ours, theirs = first.whole, second.whole
     if ours is None or theirs is None:
-        shapes = [None if window is None else window.shape for window in (ours, theirs)]
-        return compare(first.name, shapes[0], second.name, shapes[1], p)
-    whole = compare(first.name, ours.shape, second.name, theirs.shape, p)
+        return compare(first.name, first.shape, second.name, second.shape, p)
+    pair = first.name, ours.shape, second.name, theirs.shape, p
+    told = _told_coarsely(*pair)
+    if told is not None and told.decision == "refused" and is_one_place(ours, theirs, p.places):
+        return told
+    whole = told or compare(*pair, closely=True)
     if whole.decision == "accepted" and _is_rigid(whole, ours.shape, theirs.shape, p):
         return _at_place(located(whole, ours, theirs, p.places), ours.shape, theirs.shape, p)
     found = compare_at_places(
@@ -118,12 +120,10 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
 
 def _mirrored(first: Component, second: Component, p: FusionParameters) -> Alignment | None:
     """Compare two components, the second one mirrored, by parallel walls alone."""
-    if first.whole is None or second.whole is None:
+    ours, theirs = first.shape, second.shape
+    if ours is None or theirs is None or not may_be_mirrored(ours, theirs, p):
         return None
-    turned = prepare(mirrored(second.whole.shape.lines), p)
-    if turned is None:
-        return None
-    pair = first.name, first.whole.shape, second.name, turned, p
+    pair = first.name, ours, second.name, replace(theirs, lines=mirrored(theirs.lines)), p
     return _told_coarsely(*pair) or _by_walls(*pair)[0]
 
 

@@ -8,11 +8,11 @@ be free although both are right. Only what lies deeper in it is a contradiction.
 import math
 
 import numpy as np
-import scipy
 
 from mapweave.fusion.extrapolation import ExtrapolationParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.matching.nearness import nearest_distances
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import (
     VerificationParameters,
@@ -91,7 +91,7 @@ def _one_way(
     on = coinciding(reference, other, transform, v)
     against = contradicting(reference, other, transform, v)
     points = other.oriented.points
-    apart, _ = scipy.spatial.KDTree(shared).query(points)
+    apart = nearest_distances(shared, points)
     _, _, depth = reference.look_up(se2.transform_points(transform, points))
     deep = depth > v.clearance + LIKELY * p.bend * np.minimum(apart, p.most)
     near = apart <= within

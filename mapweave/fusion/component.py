@@ -50,9 +50,14 @@ class Component:
         return self._window(tuple(range(len(self.submaps))))
 
     @property
+    def shape(self) -> PreparedMap | None:
+        """All of it, as it is compared; None where there is too little wall."""
+        return None if self.whole is None else self.whole.shape
+
+    @property
     def size(self) -> float:
         """[m] of wall; 0 where it is too little to compare."""
-        return 0.0 if self.whole is None else float(self.whole.shape.raster.weight.sum())
+        return 0.0 if self.whole is None else self.whole.shape.wall
 
     @cached_property
     def middles(self) -> FloatArray:

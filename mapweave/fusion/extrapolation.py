@@ -7,11 +7,11 @@ the way there, so an alignment of the right places may be wrong for maps as whol
 import math
 
 import numpy as np
-import scipy
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.matching.nearness import nearest_distances
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import VerificationParameters, coinciding
 
@@ -70,8 +70,7 @@ def _beyond(
     if not shared.any():
         return math.inf
     points = other.oriented.points
-    distance, _ = scipy.spatial.KDTree(points[shared]).query(points)
-    return float(np.median(distance))
+    return float(np.median(nearest_distances(points[shared], points)))
 
 
 def holds(reach: float, parameters: ExtrapolationParameters) -> float:

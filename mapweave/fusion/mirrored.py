@@ -9,8 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from mapweave.fusion.parameters import FusionParameters
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap
+from mapweave.matching.coarse_places import most_if_mirrored
+from mapweave.matching.hypotheses import PreparedMap
 from mapweave.reasons import Reason, ReasonKind
 
 MIRROR: FloatArray = np.array([1.0, -1.0])  # what x and y become
@@ -31,6 +34,13 @@ def mirrored(lines: LineMap) -> LineMap:
         np.ascontiguousarray(lines.support[::-1]),
         tuple(ring[::-1] * MIRROR for ring in lines.free_space),
     )
+
+
+def may_be_mirrored(ours: PreparedMap, theirs: PreparedMap, p: FusionParameters) -> bool:
+    """Whether so much may be in common of two maps, one of them mirrored, as must be to tell."""
+    maps = (ours.lines, ours.coarse), (theirs.lines, theirs.coarse)
+    most = most_if_mirrored(*maps, p.hypotheses.coarse, p.verification)
+    return most >= p.mirrored_part * p.mirrored_wall
 
 
 def told_if_mirrored(

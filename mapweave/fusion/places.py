@@ -42,6 +42,11 @@ class PlaceParameters(StageParameters):
         gt=0,
         description="[m] about a place within which submaps are rigid",
     )
+    one_place: float = derived(
+        lambda c: 4 * c.mapping.submap_length,
+        gt=0,
+        description="[m] of the longer side of a map that is one place: what lies about one",
+    )
     proposed: int = Field(5, ge=1, description="places of each submap that the index proposes")
     min_score: float = Field(
         4.0, gt=0, description="[m] in common less contradicted, of a place worth comparing"
@@ -101,6 +106,11 @@ def compare_at_places(
         return max((e.alignment for e in telling), key=lambda a: a.confidence, default=None)
     rivals = [group for group in groups if group is not proven[0]]
     return _decided(proven[0], max(rivals, key=_support, default=[]), p)
+
+
+def is_one_place(ours: Window, theirs: Window, p: PlaceParameters) -> bool:
+    """Whether what two maps share lies about one place: they were compared there, as wholes."""
+    return min(ours.shape.side, theirs.shape.side) <= p.one_place
 
 
 def located(found: Alignment, ours: Window, theirs: Window, p: PlaceParameters) -> Alignment:

@@ -9,12 +9,12 @@ import math
 from functools import reduce
 
 import numpy as np
-import scipy
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.geometry.extent import longer_sides
+from mapweave.kernels.extent import longer_sides
+from mapweave.kernels.matching.parts import nearest_parts
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import VerificationParameters, coinciding
 
@@ -141,14 +141,11 @@ def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArr
     cut, step = raster.depth[: rows * p.coarse, : columns * p.coarse], range(p.coarse)
     parts = [cut[i :: p.coarse, j :: p.coarse] for i in step for j in step]
     depth = reduce(np.maximum, parts)
-    found, count = scipy.ndimage.label(depth > p.passage, np.ones((3, 3)))
-    label = np.asarray(found, dtype=np.int64)
+    label, nearest = nearest_parts(depth > p.passage)
+    count = int(label.max(initial=0))
     if count == 0:
         return np.zeros((rows, columns), dtype=np.int64), np.empty(0)
-    away = scipy.ndimage.distance_transform_edt(
-        label == 0, return_distances=False, return_indices=True
-    )
-    return label[tuple(away)] - 1, _extents(label, count) * p.coarse * raster.cell + 2 * p.passage
+    return nearest - 1, _extents(label, count) * p.coarse * raster.cell + 2 * p.passage
 
 
 def _extents(label: IntArray, count: int) -> FloatArray:

@@ -14,6 +14,13 @@
 #include <tuple>
 #include <vector>
 
+// Where the machine has wider registers they are used: the same results, for nothing is fused.
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
+#define MAPWEAVE_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define MAPWEAVE_WIDE
+#endif
+
 namespace nb = nanobind;
 
 template <typename T, int N>

@@ -79,15 +79,20 @@ inline std::vector<int64_t> significant_peaks(const std::vector<double>& histogr
   return peaks;
 }
 
+// What counts for each bin, of `period` in all, smoothed.
+inline std::vector<double> histogram_of(const std::vector<double>& angles, const double* mass, int64_t bins,
+                                        double period, double smoothing) {
+  std::vector<double> raw(static_cast<size_t>(bins), 0.0);
+  for (size_t i = 0; i < angles.size(); ++i) {
+    const int64_t bin = static_cast<int64_t>(std::nearbyint(angles[i] * static_cast<double>(bins) / period));
+    raw[static_cast<size_t>((bin % bins + bins) % bins)] += mass[i];
+  }
+  return smoothed(raw, smoothing * static_cast<double>(bins) / period);
+}
+
 // Ascending, in [0, pi); `angles` [rad] count with their `mass`.
 inline std::vector<double> find(const std::vector<double>& angles, const std::vector<double>& mass, const Rules& rules) {
-  const double per_bin = kPeriod / static_cast<double>(rules.bins);
-  std::vector<double> raw(static_cast<size_t>(rules.bins), 0.0);
-  for (size_t i = 0; i < angles.size(); ++i) {
-    const int64_t bin = static_cast<int64_t>(std::nearbyint(angles[i] * static_cast<double>(rules.bins) / kPeriod));
-    raw[static_cast<size_t>((bin % rules.bins + rules.bins) % rules.bins)] += mass[i];
-  }
-  const std::vector<double> histogram = smoothed(raw, rules.smoothing / per_bin);
+  const std::vector<double> histogram = histogram_of(angles, mass.data(), rules.bins, kPeriod, rules.smoothing);
   std::vector<double> directions;
   if (std::all_of(histogram.begin(), histogram.end(), [](double each) { return each == 0.0; })) return directions;
   for (const int64_t bin : significant_peaks(histogram, rules)) {
@@ -104,18 +109,32 @@ inline std::vector<double> find(const std::vector<double>& angles, const std::ve
   return directions;
 }
 
-inline Out<double> of_segments(In<double, 2> segments, In<double, 1> weights, nb::handle given) {
+inline std::vector<double> angles_of(In<double, 2> segments, In<double, 1> weights) {
   const size_t n = segments.shape(0);
   if (segments.shape(1) != 4 || weights.shape(0) != n)
     throw std::invalid_argument("segments: (n, 4), weights: (n,) expected");
-  const Rules rules = Rules::of(given);
-  if (!(rules.bins >= 1 && rules.smoothing > 0)) throw std::invalid_argument("bins, smoothing: > 0 expected");
   std::vector<double> angles(n);
   for (size_t i = 0; i < n; ++i) {
     const double* s = segments.data() + 4 * i;
     angles[i] = std::atan2(s[3] - s[1], s[2] - s[0]);
     if (!std::isfinite(angles[i])) throw std::invalid_argument("segments: finite numbers expected");
   }
+  return angles;
+}
+
+inline Out<double> histogram(In<double, 2> segments, In<double, 1> weights, int64_t bins, double period,
+                             double smoothing) {
+  if (!(bins >= 1 && bins <= 100'000 && period > 0 && smoothing > 0 && smoothing <= period))
+    throw std::invalid_argument("bins, period, smoothing: > 0, and no more than a period expected");
+  std::vector<double> found = histogram_of(angles_of(segments, weights), weights.data(), bins, period, smoothing);
+  return give(std::move(found), {static_cast<size_t>(bins)});
+}
+
+inline Out<double> of_segments(In<double, 2> segments, In<double, 1> weights, nb::handle given) {
+  const Rules rules = Rules::of(given);
+  if (!(rules.bins >= 1 && rules.smoothing > 0)) throw std::invalid_argument("bins, smoothing: > 0 expected");
+  const std::vector<double> angles = angles_of(segments, weights);
+  const size_t n = angles.size();
   std::vector<double> found = find(angles, std::vector<double>(weights.data(), weights.data() + n), rules);
   const size_t count = found.size();
   return give(std::move(found), {count});
@@ -125,4 +144,6 @@ inline Out<double> of_segments(In<double, 2> segments, In<double, 1> weights, nb
 
 inline void bind_main_directions(nb::module_& m) {
   m.def("main_directions", &main_directions::of_segments, nb::arg("segments"), nb::arg("weights"), nb::arg("rules"));
+  m.def("direction_histogram", &main_directions::histogram, nb::arg("segments"), nb::arg("weights"), nb::arg("bins"),
+        nb::arg("period"), nb::arg("smoothing"));
 }

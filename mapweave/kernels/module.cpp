@@ -10,6 +10,8 @@
 #include "marks.hpp"
 #include "merging.hpp"
 #include "multiview.hpp"
+#include "nearness.hpp"
+#include "parts.hpp"
 #include "place_views.hpp"
 #include "point_map.hpp"
 #include "polygons.hpp"
@@ -24,6 +26,7 @@
 #include "shape_index.hpp"
 #include "shifts.hpp"
 #include "slivers.hpp"
+#include "standing.hpp"
 #include "viewpoints.hpp"
 #include "windows.hpp"
 
@@ -40,6 +43,8 @@ NB_MODULE(_compiled, m) {
   bind_marks(m);
   bind_merging(m);
   bind_multiview(m);
+  bind_nearness(m);
+  bind_parts(m);
   bind_place_views(m);
   bind_point_map(m);
   bind_polygons(m);
@@ -53,6 +58,7 @@ NB_MODULE(_compiled, m) {
   bind_shape_index(m);
   bind_shifts(m);  // of the views above
   bind_slivers(m);
+  bind_standing(m);
   bind_viewpoints(m);
   bind_pose_evidence(m);  // of the points and viewpoints above
   bind_windows(m);

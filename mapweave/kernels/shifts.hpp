@@ -8,28 +8,29 @@
 #include "arrays.hpp"
 #include "place_views.hpp"
 
-// Where the machine has wider registers they are used: the same sums, for nothing is fused.
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__GLIBC__)
-#define MAPWEAVE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define MAPWEAVE_WIDE
-#endif
-
 namespace shifts {
 
 constexpr int kFacings = 8;   // in wide cells: 45° each
 constexpr double kCentimetre = 0.01;
+
+constexpr int64_t kAtOnce = 8;  // cells added: rows go on with as many that say nothing, and so do all sums
 
 // Adds the used parts of rows to those of sums, times `metres`. Whole numbers, small enough for exact sums in single
 // precision: no order of adding tells.
 MAPWEAVE_WIDE inline void add_rows(float* __restrict sums, int64_t stride, const float* __restrict worth,
                                    int64_t columns, const std::pair<int64_t, int64_t>* used, int64_t rows,
                                    float metres) {
-  for (int64_t i = 0; i < rows; ++i) {
-    float* sum = sums + i * stride;
-    const float* row = worth + i * columns;
-    for (int64_t k = used[i].first; k < used[i].second; ++k) sum[k] += metres * row[k];
-  }
+  for (int64_t i = 0; i < rows; ++i)
+    for (int64_t k = used[i].first; k < used[i].second; k += kAtOnce) {
+      float* sum = sums + i * stride + k;
+      const float* row = worth + i * columns + k;
+      for (int64_t u = 0; u < kAtOnce; ++u) sum[u] += metres * row[u];
+    }
+}
+
+MAPWEAVE_WIDE inline void add_up(float* __restrict sums, const float* __restrict twice, const float* __restrict once,
+                                 const float* __restrict other, const float* __restrict seen, size_t count) {
+  for (size_t k = 0; k < count; ++k) sums[k] = 2 * twice[k] + once[k] + other[k] + seen[k];
 }
 
 struct Wall {
@@ -38,18 +39,30 @@ struct Wall {
   float metres;  // [cm], whole
 };
 
+// Memory that is kept from one turn to the next, and from call to call: to ask for it anew takes longer than to fill it.
+struct Memory {
+  std::vector<float> near, seen, worth[2], sums;
+  std::vector<double> metres;  // all 0 between two maps
+
+  // Lets go of it where it was much.
+  void release() {
+    constexpr size_t kKept = size_t{1} << 20;
+    if (near.capacity() + metres.capacity() + sums.capacity() > kKept) *this = Memory();
+  }
+};
+
 // A map at one turn, in wide cells: what a metre of wall counts in each, by the way it faces, from the far corner on
 // where it is `reversed`; and its walls.
 class WideMap {
  public:
   WideMap(const place_views::PlaceView& view, double turn, double width, int64_t directions, float weight,
-          bool reversed)
+          bool reversed, Memory& memory)
       : cosine_(std::cos(turn)), sine_(std::sin(turn)), turns_(turn / 6.283185307179586476925286766559 + 2),
-        width_(width), reversed_(reversed) {
+        width_(width), reversed_(reversed), worth_(memory.worth[reversed]) {
+    check(view);
     frame(view);
-    count_cells(view, directions, weight);
-    collect_walls(view);
-    bound_rows();
+    count_cells(view, directions, weight, memory);
+    collect_walls(view, memory.metres);
   }
 
   double x() const { return x_; }
@@ -57,9 +70,11 @@ class WideMap {
   int64_t rows() const { return rows_; }
   int64_t columns() const { return columns_; }
   const std::vector<Wall>& walls() const { return walls_; }
-  const float* worth(int facing) const { return worth_.data() + facing * rows_ * columns_; }
+  // Rows are `stride` apart: after the last column nothing is said.
+  const float* worth(int facing) const { return worth_.data() + facing * rows_ * stride(); }
+  int64_t stride() const { return columns_ + kAtOnce; }
   // From where to where each row says anything.
-  const std::pair<int64_t, int64_t>* used(int facing) const { return used_.data() + facing * rows_; }
+  const std::pair<int64_t, int64_t>* used() const { return used_.data(); }
 
  private:
   void frame(const place_views::PlaceView& view) {
@@ -79,10 +94,9 @@ class WideMap {
     return {cosine_ * place.first - sine_ * place.second, sine_ * place.first + cosine_ * place.second};
   }
 
-  size_t at(std::pair<double, double> place) const {
+  std::pair<int64_t, int64_t> cell(std::pair<double, double> place) const {
     const auto [x, y] = turned(place);
-    return static_cast<size_t>(static_cast<int64_t>((x - x_) / width_) * columns_ +
-                               static_cast<int64_t>((y - y_) / width_));
+    return {static_cast<int64_t>((x - x_) / width_), static_cast<int64_t>((y - y_) / width_)};
   }
 
   int facing(double turn) const {
@@ -91,10 +105,11 @@ class WideMap {
 
   // Wall counts 2 for each cell near a wall that faces as it does, 1 where that is the next facing; every second row
   // and column.
-  void count_cells(const place_views::PlaceView& view, int64_t directions, float weight) {
-    const size_t size = static_cast<size_t>(rows_ * columns_);
-    std::vector<float> seen(size, 0.0f);
-    worth_.assign(kFacings * size, 0.0f);
+  void count_cells(const place_views::PlaceView& view, int64_t directions, float weight, Memory& memory) {
+    const size_t size = static_cast<size_t>(rows_ * stride());
+    memory.near.assign(kFacings * size, 0.0f);
+    memory.seen.assign(size, 0.0f);
+    used_.assign(static_cast<size_t>(rows_), {columns_, 0});
     std::vector<int> facings(directions);
     for (int64_t d = 0; d < directions; ++d)
       facings[d] = facing((static_cast<double>(d) + 0.5) / static_cast<double>(directions));
@@ -102,54 +117,51 @@ class WideMap {
       for (int64_t j = 0; j < view.columns(); j += 2) {
         const int64_t code = view.code(i, j);
         if (code == directions) continue;
-        const size_t place = at(view.centre(i, j)), cell = reversed_ ? size - 1 - place : place;
-        if (code > directions) {
-          seen[cell] -= 2 * weight;
-          continue;
-        }
-        const int f = facings[code];
-        worth_[f * size + cell] += 2;
-        worth_[((f + 1) & (kFacings - 1)) * size + cell] += 1;
-        worth_[((f + kFacings - 1) & (kFacings - 1)) * size + cell] += 1;
+        const auto [row, column] = cell(view.centre(i, j));
+        const int64_t i_there = reversed_ ? rows_ - 1 - row : row, j_there = reversed_ ? columns_ - 1 - column : column;
+        const size_t place = static_cast<size_t>(i_there * stride() + j_there);
+        auto& [first, last] = used_[i_there];
+        first = std::min(first, j_there), last = std::max(last, j_there + 1);
+        if (code > directions)
+          memory.seen[place] -= 2 * weight;
+        else
+          memory.near[facings[code] * size + place] += 1;
       }
+    worth_.resize(kFacings * size);
+    const auto near = [&](int f) { return memory.near.data() + (f & (kFacings - 1)) * size; };
     for (int f = 0; f < kFacings; ++f)
-      for (size_t k = 0; k < size; ++k) worth_[f * size + k] += seen[k];
+      add_up(worth_.data() + f * size, near(f), near(f + 1), near(f - 1), memory.seen.data(), size);
   }
 
-  void collect_walls(const place_views::PlaceView& view) {
+  void check(const place_views::PlaceView& view) const {
+    for (size_t k = 0; k < view.samples(); ++k)
+      if (!view.holds(view.sample(k)[0], view.sample(k)[1]))
+        throw std::invalid_argument("samples: inside of the raster expected");
+  }
+
+  void collect_walls(const place_views::PlaceView& view, std::vector<double>& metres) {
     const size_t size = static_cast<size_t>(rows_ * columns_);
-    std::vector<double> metres(kFacings * size, 0.0);
+    if (metres.size() < kFacings * size) metres.resize(kFacings * size, 0.0);
     std::vector<size_t> found;
     for (size_t k = 0; k < view.samples(); ++k) {
       const double* p = view.sample(k);
-      if (!view.holds(p[0], p[1])) throw std::invalid_argument("samples: inside of the raster expected");
-      const size_t cell = facing(p[2]) * size + at({p[0], p[1]});
-      if (metres[cell] == 0 && p[3] > 0) found.push_back(cell);
-      metres[cell] += p[3];
+      const auto [row, column] = cell({p[0], p[1]});
+      const size_t place = facing(p[2]) * size + static_cast<size_t>(row * columns_ + column);
+      if (metres[place] == 0 && p[3] > 0) found.push_back(place);
+      metres[place] += p[3];
     }
-    for (const size_t cell : found) {
-      const int64_t place = static_cast<int64_t>(cell % size);
-      walls_.push_back({place / columns_, place % columns_, static_cast<int>(cell / size),
-                        static_cast<float>(std::nearbyint(metres[cell] / kCentimetre))});
+    for (const size_t place : found) {
+      const int64_t in_plane = static_cast<int64_t>(place % size);
+      walls_.push_back({in_plane / columns_, in_plane % columns_, static_cast<int>(place / size),
+                        static_cast<float>(std::nearbyint(metres[place] / kCentimetre))});
+      metres[place] = 0;
     }
-  }
-
-  void bound_rows() {
-    used_.assign(static_cast<size_t>(kFacings * rows_), {0, 0});
-    for (int f = 0; f < kFacings; ++f)
-      for (int64_t i = 0; i < rows_; ++i) {
-        const float* row = worth(f) + i * columns_;
-        int64_t first = 0, last = columns_;
-        while (first < last && row[first] == 0) ++first;
-        while (last > first && row[last - 1] == 0) --last;
-        used_[f * rows_ + i] = {first, last};
-      }
   }
 
   double cosine_, sine_, turns_, width_, x_ = 0, y_ = 0;
   bool reversed_;
   int64_t rows_ = 0, columns_ = 0;
-  std::vector<float> worth_;
+  std::vector<float>& worth_;
   std::vector<Wall> walls_;
   std::vector<std::pair<int64_t, int64_t>> used_;
 };
@@ -157,9 +169,10 @@ class WideMap {
 // What every shift of a map over another counts, which is reversed.
 class Sums {
  public:
-  Sums(const WideMap& reference, const WideMap& other)
+  Sums(const WideMap& reference, const WideMap& other, Memory& memory)
       : rows_(reference.rows() + other.rows() - 1), columns_(reference.columns() + other.columns() - 1),
-        sum_(static_cast<size_t>(rows_ * columns_), 0.0f) {
+        sum_(memory.sums) {
+    sum_.assign(static_cast<size_t>(rows_ * columns_ + kAtOnce), 0.0f);
     for (const Wall& w : other.walls())
       add(reference, w, other.rows() - 1 - w.row, other.columns() - 1 - w.column);
     for (const Wall& w : reference.walls()) add(other, w, w.row, w.column);
@@ -199,8 +212,8 @@ class Sums {
 
  private:
   void add(const WideMap& map, const Wall& wall, int64_t down, int64_t right) {
-    add_rows(sum_.data() + down * columns_ + right, columns_, map.worth(wall.facing), map.columns(),
-             map.used(wall.facing), map.rows(), wall.metres);
+    add_rows(sum_.data() + down * columns_ + right, columns_, map.worth(wall.facing), map.stride(),
+             map.used(), map.rows(), wall.metres);
   }
 
   bool is_peak(int64_t i, int64_t j) const {
@@ -217,7 +230,7 @@ class Sums {
   }
 
   int64_t rows_, columns_;
-  std::vector<float> sum_;
+  std::vector<float>& sum_;
 };
 
 inline std::pair<Out<double>, Out<double>> best_shifts(const place_views::PlaceView& reference,
@@ -227,13 +240,14 @@ inline std::pair<Out<double>, Out<double>> best_shifts(const place_views::PlaceV
   if (!(width > 1e-3) || directions < 1 || directions > 254 || weight < 0 || weight > 100 || count < 0)
     throw std::invalid_argument("width > 0, 1 to 254 directions, weight of 0 to 100, count >= 0 expected");
   std::vector<double> found, scores;
-  const WideMap here(reference, 0.0, width, directions, static_cast<float>(weight), false);
+  static thread_local Memory memory;
+  const WideMap here(reference, 0.0, width, directions, static_cast<float>(weight), false, memory);
   // Of the cells looked at so many lie in a wide one; both ways are added up, and each counts 2.
   const double cells = width * width / (4 * reference.cell() * other.cell()), unit = kCentimetre / (4 * cells);
   for (size_t t = 0; t < turns.shape(0); ++t) {
     if (!(std::abs(turns(t)) < 7)) throw std::invalid_argument("turns: angles within a turn expected");
-    const WideMap there(other, turns(t), width, directions, static_cast<float>(weight), true);
-    const Sums sums(here, there);
+    const WideMap there(other, turns(t), width, directions, static_cast<float>(weight), true, memory);
+    const Sums sums(here, there, memory);
     for (const int64_t place : sums.peaks(count)) {
       const auto [i, j] = sums.top(place);
       found.insert(found.end(), {here.x() - there.x() + width * (i - static_cast<double>(there.rows() - 1)),
@@ -242,6 +256,7 @@ inline std::pair<Out<double>, Out<double>> best_shifts(const place_views::PlaceV
       scores.push_back(sums.at(place) * unit);
     }
   }
+  memory.release();
   const size_t n = scores.size();
   return {give(std::move(found), {n, 3}), give(std::move(scores), {n})};
 }

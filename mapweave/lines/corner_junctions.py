@@ -9,13 +9,13 @@ seen on the left, the next wall begins where this one ends.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.geometry.polygons import edges_of
 from mapweave.geometry.segments import cross, units
+from mapweave.kernels.lines.evidence import near_points
 from mapweave.kernels.polygons import lengths_inside
 from mapweave.parameters import StageParameters, derived
 
@@ -165,9 +165,5 @@ def neighbours(segments: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
     tuple of IntArray
         (k,) the segment that ends there, and (k,) that which starts.
     """
-    if not len(segments):
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    ends, starts = scipy.spatial.KDTree(segments[:, 2:]), scipy.spatial.KDTree(segments[:, :2])
-    near = ends.sparse_distance_matrix(starts, reach, output_type="ndarray")
-    a, b = near["i"].astype(np.int64), near["j"].astype(np.int64)
+    a, b = near_points(segments[:, 2:], segments[:, :2], reach)
     return a[a != b], b[a != b]

@@ -5,13 +5,13 @@ face or goes through it by no more than noise, is moved along its own line to th
 """
 
 import numpy as np
-import scipy
 import shapely
 from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.geometry.segments import cross, units
+from mapweave.kernels.lines.evidence import near_points
 from mapweave.lines.corner_junctions import length_inside
 from mapweave.parameters import StageParameters, derived
 
@@ -33,7 +33,7 @@ class WallEndParameters(StageParameters):
         ge=0,
         description="[m] of free space that noise may explain",
     )
-    meeting: float = Field(1e-6, ge=0, description="[m] within which an end has met another end")
+    meeting: float = Field(1e-6, gt=0, description="[m] within which an end has met another end")
 
 
 def meet_walls(
@@ -80,5 +80,5 @@ def meet_walls(
 
 def _is_loose(ends: FloatArray, meeting: float) -> BoolArray:
     """Return (k,) which of the ends meet no other end."""
-    distance = np.asarray(scipy.spatial.KDTree(ends).query(ends, k=2)[0])
-    return np.asarray(distance[:, 1] > meeting)
+    end, _ = near_points(ends, ends, meeting)
+    return np.asarray(np.bincount(end, minlength=len(ends)) == 1)  # itself

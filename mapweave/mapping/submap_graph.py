@@ -4,11 +4,11 @@ However many submaps there are, a closure moves those around it: what is many li
 unless the loop that was closed is a long one.
 """
 
+import heapq
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry import se2
@@ -148,17 +148,20 @@ class SubmapGraph:
 
     def _shortest(self, submap: int, count: int, weight: FloatArray) -> FloatArray:
         """(count,) the least sum of `weight` of links that are relied on, from `submap`."""
-        used = sorted(
-            (w, k.first, k.second)
-            for w, k, relied in zip(weight.tolist(), self._links, self._relied, strict=True)
-            if relied
-        )
-        # Of two links between the same submaps the shorter one counts; a matrix would add them.
-        shortest = {(first, second): w for w, first, second in reversed(used)}
-        ends = np.array(list(shortest), dtype=np.int64).reshape(-1, 2)
-        graph = scipy.sparse.csr_array((list(shortest.values()), ends.T), shape=(count, count))
-        chains: FloatArray = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=[submap])
-        return np.asarray(chains[0])
+        around: list[list[tuple[int, float]]] = [[] for _ in range(count)]
+        for w, k, relied in zip(weight.tolist(), self._links, self._relied, strict=True):
+            if relied:
+                around[k.first].append((k.second, w))
+                around[k.second].append((k.first, w))
+        # Dijkstra's way; SciPy's takes longer to load than these few links to follow.
+        chains, reached = np.full(count, np.inf), [(0.0, submap)]
+        while reached:
+            length, here = heapq.heappop(reached)
+            if length < chains[here]:
+                chains[here] = length
+                for there, w in around[here]:
+                    heapq.heappush(reached, (length + w, there))
+        return chains
 
     def _fitted(self, submaps: Sequence[Submap], moved: BoolArray) -> list[Submap]:
         """Fit the submaps that may be `moved` (n,) to the links; their neighbours hold them."""

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.kernels.matching.place_views import PlaceView, place_view
+from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view
 from mapweave.kernels.matching.shifts import best_shifts
 from mapweave.lines.directions import likely_turns
 from mapweave.maps import LineMap
@@ -71,9 +71,23 @@ class CoarsePlaceParameters(StageParameters):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseMap:
-    """A line map as it is looked for coarsely: its raster, and what its cells say."""
+    """A line map as it is looked for coarsely.
+
+    Attributes
+    ----------
+    field
+        Its raster.
+    codes
+        (rows, columns) what the raster's cells say, as of `verification.said_by_cells`.
+    samples
+        (n, 4) of its walls: x, y [m], where the normal points, in [0, 1) turns, and metres.
+    view
+        What cells say and samples, together.
+    """
 
     field: DistanceField
+    codes: Codes
+    samples: FloatArray
     view: PlaceView
 
     @classmethod
@@ -91,7 +105,16 @@ class CoarseMap:
         metres = np.where(moved, p.moved_part, 1.0) * field.weight
         samples = np.column_stack([field.oriented.points, turns, metres])
         codes = said_by_cells(field, p.closeness, p.clearance)
-        return cls(field, place_view(codes, field.origin, field.cell, samples))
+        return cls(field, codes, samples, place_view(codes, field.origin, field.cell, samples))
+
+    def mirrored(self) -> PlaceView:
+        """Return the same view as a sensor would have it that hangs upside down: y is -y."""
+        codes = np.where(self.codes < DIRECTIONS, DIRECTIONS - 1 - self.codes, self.codes)
+        (x, y), cell = self.field.origin, self.field.cell
+        origin = np.array([x, -y - cell * codes.shape[1]])
+        samples = self.samples * np.array([1.0, -1.0, -1.0, 1.0])
+        samples[:, 2] %= 1.0
+        return place_view(np.ascontiguousarray(codes[:, ::-1]), origin, cell, samples)
 
 
 class CoarsePlaces(NamedTuple):
@@ -120,14 +143,40 @@ def coarse_places(
 ) -> CoarsePlaces:
     """Look where `other` may lie in `reference`."""
     p, (ours, here), (theirs, there) = parameters, reference, other
-    turns = likely_turns(
-        ours.segments, theirs.segments, p.turns, p.turn_separation, p.least_parallel
-    )
-    weight = round(verification.contradiction_weight)
-    shifted, rough = best_shifts(
-        here.view, there.view, turns, p.width, DIRECTIONS, weight, p.shifts
-    )
+    views, turns = (here.view, there.view), _turns(ours.segments, theirs.segments, p)
+    shifted, rough = _shifts(views, turns, p.shifts, p, verification)
     best = np.argsort(-rough, kind="stable")[: p.aligned]
     aligned = align_on_raster(here.field, there.field, shifted[best], p.alignment)
     scores = coarse_scores(here.field, there.field, aligned, p.samples, verification)
     return CoarsePlaces(aligned, scores, shifted)
+
+
+def most_if_mirrored(
+    reference: tuple[LineMap, CoarseMap],
+    other: tuple[LineMap, CoarseMap],
+    parameters: CoarsePlaceParameters,
+    verification: VerificationParameters,
+) -> float:
+    """Return the most that any shift of `other`, mirrored, counts in wide cells [m]."""
+    p, (ours, here), (theirs, there) = parameters, reference, other
+    # What is on the left of a wall is on its right then: it runs the other way.
+    turned = theirs.segments[:, [2, 3, 0, 1]] * np.array([1.0, -1.0, 1.0, -1.0])
+    views, turns = (here.view, there.mirrored()), _turns(ours.segments, turned, p)
+    return float(_shifts(views, turns, 1, p, verification)[1].max(initial=0.0))
+
+
+def _turns(ours: FloatArray, theirs: FloatArray, p: CoarsePlaceParameters) -> FloatArray:
+    """(k,) [rad] at which much of two maps' wall is parallel, of (n, 4) and (m, 4) segments."""
+    return likely_turns(ours, theirs, p.turns, p.turn_separation, p.least_parallel)
+
+
+def _shifts(
+    views: tuple[PlaceView, PlaceView],
+    turns: FloatArray,
+    count: int,
+    p: CoarsePlaceParameters,
+    verification: VerificationParameters,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the best `count` shifts at each of (k,) `turns`, (n, 3), and what they count [m]."""
+    weight = round(verification.contradiction_weight)
+    return best_shifts(*views, turns, p.width, DIRECTIONS, weight, count)

@@ -72,6 +72,17 @@ class PreparedMap:
         """The same, as it is looked for first."""
         return CoarseMap.of(self.lines, self.parameters.coarse, self.verification)
 
+    @property
+    def wall(self) -> float:
+        """[m] of it, drawn twice or not."""
+        return float(self.coarse.field.weight.sum())
+
+    @property
+    def side(self) -> float:
+        """[m] the longer side of the upright rectangle around it."""
+        ends = self.lines.segments.reshape(-1, 2)
+        return float(np.ptp(ends, axis=0).max())
+
     @cached_property
     def windows(self) -> tuple[Windows, ...]:
         """Stretches of its polylines."""

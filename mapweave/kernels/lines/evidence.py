@@ -98,6 +98,13 @@ def near_pairs(segments: Floats, points: Floats, directions: Floats, reach: floa
     return cast("Near", compute(segments, points, directions, reach))
 
 
+def near_points(first: Floats, second: Floats, reach: float) -> tuple[Ints, Ints]:
+    """Pair points (n, 2) with those of (m, 2) within `reach` [m]; by the first, then the other."""
+    alone = np.hstack([first, first])
+    one, other, *_ = near_pairs(alone, np.ascontiguousarray(second), np.zeros(second.shape), reach)
+    return one, other
+
+
 def take_greedily(
     count: int, segment: Ints, sample: Ints, explains: Bools, weights: Floats, price: float
 ) -> Ints:

@@ -1,7 +1,7 @@
 """Main directions: the significant peaks of the histogram of segment directions (paper, VI-A)."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import scipy
@@ -42,7 +42,8 @@ def numpy_main_directions(
 
     Each segment counts with its (n,) weight.
     """
-    histogram = direction_histogram(segments, weights, rules.bins, LINE_PERIOD, rules.smoothing)
+    asked = segments, weights, rules.bins, LINE_PERIOD, rules.smoothing
+    histogram = direction_histogram_numpy(*asked)
     if not histogram.any():
         return np.empty(0)
     angles = _angles(segments)
@@ -51,13 +52,36 @@ def numpy_main_directions(
     return np.sort(np.mod(fine, LINE_PERIOD))
 
 
-def direction_histogram(
+def direction_histogram_numpy(
     segments: FloatArray, weights: FloatArray, bins: int, period: float, smoothing: float
 ) -> FloatArray:
-    """Return the (bins,) smoothed circular histogram; bin i is centred at ``i * period / bins``."""
+    """Twin of `direction_histogram`."""
     index = np.rint(_angles(segments) * bins / period).astype(np.int64) % bins
     raw = np.bincount(index, weights, minlength=bins).astype(np.float64)
     return np.asarray(scipy.ndimage.gaussian_filter1d(raw, smoothing * bins / period, mode="wrap"))
+
+
+def direction_histogram(
+    segments: FloatArray, weights: FloatArray, bins: int, period: float, smoothing: float
+) -> FloatArray:
+    """Return the (bins,) smoothed circular histogram; bin i is centred at ``i * period / bins``.
+
+    Parameters
+    ----------
+    segments, weights
+        (n, 4) x1 y1 x2 y2 [m]; (n,) what each counts.
+    smoothing
+        Standard deviation [rad].
+
+    Raises
+    ------
+    ValueError
+        Where lengths do not agree, or a number is not finite.
+    """
+    if COMPILED is None:
+        return direction_histogram_numpy(segments, weights, bins, period, smoothing)
+    given = np.ascontiguousarray(segments), np.ascontiguousarray(weights)
+    return cast("FloatArray", COMPILED.direction_histogram(*given, bins, period, smoothing))
 
 
 def line_difference(first: ArrayLike, second: ArrayLike) -> FloatArray:

@@ -13,7 +13,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap, RobotMap, SharedPlace, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
-from tests.mapweave.buildings import corridor, line_map, part
+from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, corridor, line_map, part
 
 F = FusionParameters()
 P = F.places
@@ -78,6 +78,21 @@ def test_an_alignment_of_rigid_maps_says_where_it_holds() -> None:
     assert np.ptp(apart[:, 0]) > 40
     assert max(map(off, found.places)) < 0.05
     assert found.evidence.place == found.confidence
+
+
+@pytest.mark.parametrize(("one_place", "asked"), [(32.0, False), (15.0, True)])
+def test_what_a_coarse_look_refuses_is_asked_about_places_where_the_smaller_map_has_several(
+    one_place: float, asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies about one place was compared as a whole already."""
+    looked: list[bool] = []
+    monkeypatch.setattr("mapweave.fusion.align.compare_at_places", lambda *_: looked.append(True))
+    first, second = (
+        RobotMap(name, "boot", 1, (submap(0, part(outline, 0, 20), 1.0, np.zeros(3)),))
+        for name, outline in (("a", BUILDING), ("b", OTHER_BUILDING))
+    )
+    (found,) = align(first, second, FusionParameters(places=PlaceParameters(one_place=one_place)))
+    assert found.decision == "refused" and looked == [True] * asked
 
 
 def test_where_nothing_is_shared_no_place_is_named() -> None:

@@ -10,7 +10,12 @@ from numpy.random import Generator
 
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.kernels.denials import NumpyWitnesses
-from mapweave.kernels.lines.main_directions import numpy_main_directions
+from mapweave.kernels.lines.evidence import near_points
+from mapweave.kernels.lines.main_directions import (
+    direction_histogram,
+    direction_histogram_numpy,
+    numpy_main_directions,
+)
 from mapweave.kernels.lines.merging import NumpyEvolvingMap
 from mapweave.kernels.lines.polylines import numpy_group_polylines
 from mapweave.kernels.lines.slivers import numpy_sliver_owners
@@ -192,3 +197,26 @@ def test_what_does_not_fit_is_refused(kind: str) -> None:
         witnesses.count(good, np.zeros(1, dtype=np.int64))
     with pytest.raises(ValueError, match="numbers"):
         witnesses.count_numbered(np.array([1, 0]), good, np.zeros(2, dtype=np.int64))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, sizes, st.sampled_from([8, 180, 360]), st.sampled_from([np.pi, 2 * np.pi]))
+def test_histograms_of_directions_are_the_same(
+    seed: int, count: int, bins: int, period: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    segments, weights = walls_seen(rng, count)[:, [2, 3, 0, 1]], rng.uniform(0, 3, count)
+    asked = segments, weights, bins, period, 0.03
+    np.testing.assert_allclose(
+        direction_histogram(*asked), direction_histogram_numpy(*asked), atol=1e-9
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, sizes, st.sampled_from([1e-6, 0.3, 2.0]))
+def test_points_are_paired_with_those_within_reach(seed: int, count: int, reach: float) -> None:
+    ends = walls_seen(np.random.default_rng(seed), count).reshape(-1, 2)
+    first, second = ends[::2], np.vstack([ends[::2], ends[1::2]])
+    apart = np.hypot(*(first[:, None] - second).T).T.reshape(len(first), len(second))
+    found = near_points(first, second, reach)
+    np.testing.assert_array_equal(np.stack(found), np.stack(np.nonzero(apart <= reach)))

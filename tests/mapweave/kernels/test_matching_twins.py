@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,8 +14,11 @@ from mapweave.kernels.matching import (
     distinct,
     judging,
     marks,
+    nearness,
+    parts,
     raster_icp,
     rasters,
+    standing,
     windows,
 )
 
@@ -206,3 +210,47 @@ def test_grids_are_correlated_alike(seed: int, rows: int, count: int) -> None:
     np.testing.assert_array_equal(
         marks.highest(product, count), marks.highest_numpy(product, count)
     )
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, some, st.sampled_from([0.0, CELL / 4, CELL, 1.5 * CELL]))
+def test_the_same_things_stand_free(seed: int, count: int, reach: float) -> None:
+    """Distances of whole cells and limits of as many are told apart alike."""
+    rng = np.random.default_rng(seed)
+    points = np.repeat(some_places(rng, count), 5, axis=0) + rng.uniform(-0.2, 0.2, (5 * count, 2))
+    _, distance = rasters.nearest_samples(points, ORIGIN, CELL, 15, 20)
+    for side in (0.1, 0.4, 1.1):
+        asked = points, ORIGIN, CELL, distance, reach, side
+        found = standing.standing_free(*asked)
+        np.testing.assert_array_equal(found, standing.standing_free_numpy(*asked))
+
+
+@pytest.mark.parametrize("outside", [[-9.0, 0.0], [0.0, 9.0], [np.nan, 0.0]])
+def test_what_stands_outside_of_the_raster_is_refused(outside: list[float]) -> None:
+    distance = np.zeros((15, 20), dtype=np.float32)
+    with pytest.raises(ValueError, match="inside of the raster"):
+        standing.standing_free(np.array([outside]), ORIGIN, CELL, distance, 0.1, 1.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.sampled_from([(1, 1), (7, 9), (30, 20)]), st.sampled_from([0.0, 0.1, 0.5, 1.0]))
+def test_cells_fall_into_the_same_parts(seed: int, shape: tuple[int, int], share: float) -> None:
+    """And the nearest part is as near."""
+    chosen = np.random.default_rng(seed).random(shape) < share
+    label, nearest = parts.nearest_parts(chosen)
+    twin, other = parts.nearest_parts_numpy(chosen)
+    np.testing.assert_array_equal(label, twin)
+    np.testing.assert_array_equal(nearest == 0, other == 0)
+    least = scipy.ndimage.distance_transform_edt(label == 0)
+    for number in range(1, int(label.max(initial=0)) + 1):
+        apart = scipy.ndimage.distance_transform_edt(label != number)
+        for named in (nearest, other):
+            np.testing.assert_allclose(apart[named == number], least[named == number])
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, counts)
+def test_the_nearest_points_are_as_far(seed: int, count: int, places: int) -> None:
+    rng = np.random.default_rng(seed)
+    asked = rng.normal(0, 5, (count, 2)), rng.normal(0, 9, (places, 2))
+    same(nearness.nearest_distances(*asked), nearness.nearest_distances_numpy(*asked))

@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
+from mapweave.fusion.mirrored import mirrored
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
-from mapweave.matching.coarse_places import CoarseMap, CoarsePlaceParameters, coarse_places
+from mapweave.matching.coarse_places import (
+    CoarseMap,
+    CoarsePlaceParameters,
+    coarse_places,
+    most_if_mirrored,
+)
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.verification import VerificationParameters, verify
 from tests.mapweave.buildings import (
@@ -80,3 +86,26 @@ def test_a_map_of_one_wall_is_laid_along_it() -> None:
     found, scores = places(wall, wall)
     assert scores.max() == pytest.approx(10, rel=0.1)
     assert abs(found[np.argmax(scores), 1]) < 0.1
+
+
+def mirrored_most(reference: LineMap, other: LineMap) -> float:
+    maps = [(lines, CoarseMap.of(lines, P, JUDGED)) for lines in (reference, other)]
+    return most_if_mirrored(maps[0], maps[1], P, JUDGED)
+
+
+def test_what_fits_mirrored_counts_half_of_what_it_has_in_common_at_least(rng: Generator) -> None:
+    """And what fits as it is, or nowhere, counts less."""
+    for pose in [random_pose(rng) for _ in range(5)]:
+        there = mirrored(RIGHT).moved(pose)
+        assert mirrored_most(LEFT, there) > 0.5 * finely(LEFT, RIGHT, np.zeros(3))
+        assert mirrored_most(LEFT, RIGHT.moved(pose)) < 0.5 * finely(LEFT, RIGHT, np.zeros(3))
+    assert mirrored_most(LEFT, part(OTHER_BUILDING, 0, 20)) < 6
+
+
+def test_mirrored_cells_and_samples_are_those_of_the_mirrored_map() -> None:
+    """Shifts count the same, whichever of the two is mirrored."""
+    for lines in (LEFT, RIGHT, part(OTHER_BUILDING, 0, 20)):
+        turned = mirrored(lines)
+        most = mirrored_most(lines, turned)
+        assert mirrored_most(turned, lines) == pytest.approx(most, rel=0.15)
+        assert most > 0.7 * finely(lines, lines, np.zeros(3))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.kernels.arrays import FloatArray, IntArray
 
 TURNS = np.radians(np.arange(0.0, 90.0, 3.0))  # [rad] of the rectangles tried
 
