@@ -13,13 +13,17 @@ from mapweave.lines.merging import MergingParameters, evolve
 from mapweave.lines.polylines import group_polylines
 from mapweave.lines.simplification import SimplificationParameters, simplify, sources
 from mapweave.maps import JointComponent, LineMap
-from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
+from mapweave.matching.distance_field import DistanceFieldParameters
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.free_space import FreeSpaceParameters, rings, unite
 from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster
 from mapweave.team.recent import Recent
 from mapweave.team.walls.merging_tree import KnownMergings, Walls, merge_all
-from mapweave.team.walls.segment_confidence import SegmentConfidenceParameters, segment_confidence
+from mapweave.team.walls.segment_confidence import (
+    SegmentConfidenceParameters,
+    Witness,
+    segment_confidence,
+)
 
 STEPS = np.array(
     [2e-3, 2e-3, 2e-4]
@@ -50,14 +54,14 @@ class Piece:
     ----------
     lines
         In a frame of their own.
-    raster
-        Of them; None where no wall was seen.
+    witness
+        What they say of walls; None where no wall was seen.
     pose
         (3,) of their frame in the component's [m, m, rad].
     """
 
     lines: LineMap
-    raster: DistanceField | None
+    witness: Witness | None
     pose: FloatArray
 
 
@@ -123,9 +127,9 @@ def join(
     lines = _simplified(merged, seen, support, free, p)
     views = [
         [
-            (piece.raster, each.pose)
+            (piece.witness, each.pose)
             for piece, each in zip(pieces[name], those, strict=True)
-            if piece.raster is not None
+            if piece.witness is not None
         ]
         for name, those in placed.items()
     ]

@@ -27,6 +27,7 @@ from mapweave.team.joint_optimization import JointOptimizationParameters, JointO
 from mapweave.team.orders.joint_marks import HeldMarks, held_marks, laid_down
 from mapweave.team.orders.rulings import Rulings
 from mapweave.team.recent import Recent
+from mapweave.team.walls.segment_confidence import Witness
 
 
 class JointMapBuilder:
@@ -48,7 +49,7 @@ class JointMapBuilder:
         self.parameters = parameters or JointParameters()
         self._weaver = JointOptimizer(weaving)
         self._wholes: Recent[tuple[tuple[LineMap, bytes], ...], DistanceField | None] = Recent()
-        self._rasters: Recent[LineMap, DistanceField | None] = Recent()
+        self._witnesses: Recent[LineMap, Witness | None] = Recent()
         self._verdicts: KnownVerdicts = Recent()
         self._kept = Kept()
 
@@ -64,7 +65,7 @@ class JointMapBuilder:
         Alignments that contradict others, or what robots saw, are set aside: they stay in the joint
         map as ambiguous, the reason saying so. What operators ordered goes before.
         """
-        for kept in (self._wholes, self._rasters, self._verdicts, self._kept):
+        for kept in (self._wholes, self._witnesses, self._verdicts, self._kept):
             kept.turn()
         submaps = submaps_by_component(maps)
         found = {name: self._whole(each) for name, each in submaps.items()}
@@ -102,7 +103,7 @@ class JointMapBuilder:
             poses = {name: list(those) for name, those in woven.items()}
         pieces = {
             name: [
-                Piece(s.map, self._raster(s.map), pose)
+                Piece(s.map, self._witness(s.map), pose)
                 for s, pose in zip(submaps[name], those, strict=True)
             ]
             for name, those in poses.items()
@@ -110,8 +111,16 @@ class JointMapBuilder:
         joined = join(cluster, pieces, self.parameters, self._kept)
         return replace(joined, marks=laid_down(marks, cluster.poses, submaps, poses))
 
-    def _raster(self, lines: LineMap) -> DistanceField | None:
-        return self._rasters.get(lines, lambda: rasterise(lines, self.parameters))
+    def _witness(self, lines: LineMap) -> Witness | None:
+        # Not the raster: it takes twelve times the memory, and a team has hundreds of submaps.
+        return self._witnesses.get(
+            lines, lambda: testify(rasterise(lines, self.parameters), self.parameters)
+        )
+
+
+def testify(raster: DistanceField | None, p: JointParameters) -> Witness | None:
+    """Return what the lines of `raster` say of walls; None where there is none."""
+    return None if raster is None else Witness.of(raster, p.segments)
 
 
 def rasterise(lines: LineMap, p: JointParameters) -> DistanceField | None:

@@ -13,7 +13,7 @@ from mapweave.geometry.arguments import as_list, check_kind
 from mapweave.maps import Alignment, JointMap, LineMap, MadeWith, RobotMap, submaps_by_component
 from mapweave.team.alignment_graph import cluster_components
 from mapweave.team.joining import JointParameters, Piece, join
-from mapweave.team.joint_builder import JointMapBuilder, rasterise
+from mapweave.team.joint_builder import JointMapBuilder, rasterise, testify
 from mapweave.team.joint_optimization import JointOptimizationParameters
 
 
@@ -99,5 +99,8 @@ def build_joint_map(
     found = {name: rasterise(lines, p) for name, lines in components.items()}
     rasters = {name: raster for name, raster in found.items() if raster is not None}
     clusters, judged = cluster_components(sorted(components), alignments, p.graph, rasters)
-    pieces = {name: [Piece(lines, found[name], np.zeros(3))] for name, lines in components.items()}
+    pieces = {
+        name: [Piece(lines, testify(found[name], p), np.zeros(3))]
+        for name, lines in components.items()
+    }
     return JointMap(version, tuple(join(each, pieces, p) for each in clusters), judged)

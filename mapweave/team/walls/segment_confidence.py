@@ -1,11 +1,13 @@
 """How sure each segment of a joint map is: by the scans that saw it, and the robots' vote."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.parameters import StageParameters, derived
@@ -28,9 +30,39 @@ class SegmentConfidenceParameters(StageParameters):
     )
 
 
+SILENT, CONFIRMS, DENIES = range(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Witness:
+    """What a piece says of walls, by place: a byte a cell, of all that its raster knows.
+
+    Attributes
+    ----------
+    origin
+        (2,) the corner [m], frame of the piece.
+    cell
+        [m].
+    said
+        (rows, columns) whether a wall there is confirmed or denied.
+    """
+
+    origin: FloatArray
+    cell: float
+    said: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, raster: DistanceField, p: SegmentConfidenceParameters) -> "Witness":
+        """Return what the piece that `raster` is of says."""
+        said = np.full(raster.distance.shape, SILENT, dtype=np.uint8)
+        said[raster.depth > p.clearance] = DENIES
+        said[raster.distance <= p.closeness] = CONFIRMS
+        return cls(raster.origin, raster.cell, said)
+
+
 def segment_confidence(
     lines: LineMap,
-    views: Sequence[Sequence[tuple[DistanceField, FloatArray]]],
+    views: Sequence[Sequence[tuple[Witness, FloatArray]]],
     parameters: SegmentConfidenceParameters,
 ) -> FloatArray:
     """Return (n,) in [0, 1]: more with every scan and map that saw it, less with every denial.
@@ -51,8 +83,10 @@ def segment_confidence(
     for pieces in views:
         near = np.zeros(len(oriented), dtype=np.bool_)
         through = near.copy()
-        for raster, pose in pieces:
-            _vote(raster, pose, oriented, (near, through), parameters)
+        for witness, pose in pieces:
+            said = _heard(witness, pose, oriented)
+            near |= said == CONFIRMS
+            through |= said == DENIES
         confirm += near
         deny += through & ~near
     # What nobody confirms at this very place was merged from walls close by: one voice for it.
@@ -61,20 +95,13 @@ def segment_confidence(
     return np.asarray(lines.support / (lines.support + 1.0) * agreed)
 
 
-def _vote(
-    raster: DistanceField,
-    pose: FloatArray,
-    oriented: OrientedPoints,
-    said: tuple[BoolArray, BoolArray],
-    p: SegmentConfidenceParameters,
-) -> None:
-    """Add to two masks (n,) where the piece has a wall itself, and where it saw through instead."""
-    near, through = said
-    index = (se2.transform_points(se2.inverse(pose), oriented.points) - raster.origin) / raster.cell
-    rows, columns = raster.distance.shape
+def _heard(witness: Witness, pose: FloatArray, oriented: OrientedPoints) -> NDArray[np.uint8]:
+    """Return (n,) what a piece at `pose` says of each sample."""
+    points = se2.transform_points(se2.inverse(pose), oriented.points)
+    index = (points - witness.origin) / witness.cell
+    rows, columns = witness.said.shape
     i, j = index[:, 0], index[:, 1]
     inside = np.flatnonzero((i >= 0) & (j >= 0) & (i < rows) & (j < columns))
-    cells = i[inside].astype(np.int64), j[inside].astype(np.int64)
-    walls = raster.distance[cells] <= p.closeness
-    near[inside[walls]] = True
-    through[inside[~walls & (raster.depth[cells] > p.clearance)]] = True
+    heard = np.full(len(oriented), SILENT, dtype=np.uint8)
+    heard[inside] = witness.said[i[inside].astype(np.int64), j[inside].astype(np.int64)]
+    return heard

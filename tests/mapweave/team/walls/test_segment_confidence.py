@@ -7,7 +7,11 @@ from numpy.random import Generator
 from mapweave.geometry import se2
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
-from mapweave.team.walls.segment_confidence import SegmentConfidenceParameters, segment_confidence
+from mapweave.team.walls.segment_confidence import (
+    SegmentConfidenceParameters,
+    Witness,
+    segment_confidence,
+)
 from tests.mapweave.buildings import line_map, random_pose, rectangle, walls_of
 
 P = SegmentConfidenceParameters()
@@ -18,15 +22,19 @@ SEEN_THROUGH = 5.85 - P.clearance - 3.0  # [m] of the next one, clear of the edg
 HALF_OUT = np.array([[4.0, 3.0, 4.0, 9.0]])
 
 
-def votes(wall: LineMap, confirming: int, denying: int) -> list[DistanceField]:
+def witness(lines: LineMap) -> Witness:
+    return Witness.of(DistanceField.of(lines, DistanceFieldParameters()), P)
+
+
+def votes(wall: LineMap, confirming: int, denying: int) -> list[Witness]:
     seen = line_map(np.vstack([ROOM, wall.segments]))
     maps = [seen] * confirming + [line_map(ROOM, FREE)] * denying
-    return [DistanceField.of(one, DistanceFieldParameters()) for one in maps]
+    return [witness(one) for one in maps]
 
 
 def sure(walls: np.ndarray, confirming: int, denying: int, support: int = 9) -> float:
     wall = line_map(walls, support=support)
-    views = [[(raster, np.zeros(3))] for raster in votes(wall, confirming, denying)]
+    views = [[(said, np.zeros(3))] for said in votes(wall, confirming, denying)]
     return float(segment_confidence(wall, views, P)[0])
 
 
@@ -50,12 +58,12 @@ def test_only_the_part_that_was_seen_through_is_denied() -> None:
 def test_frames_change_nothing(rng: Generator) -> None:
     here, there = random_pose(rng), random_pose(rng)
     wall = line_map(PARTITION)
-    (raster,) = votes(wall, 0, 1)
+    (said,) = votes(wall, 0, 1)
     moved = line_map(ROOM, FREE).moved(se2.inverse(there))
-    raster_moved = DistanceField.of(moved, DistanceFieldParameters())
+    said_moved = witness(moved)
     pose = se2.compose(here, there)
-    before = segment_confidence(wall, [[(raster, np.zeros(3))]], P)
-    after = segment_confidence(wall.moved(here), [[(raster_moved, pose)]], P)
+    before = segment_confidence(wall, [[(said, np.zeros(3))]], P)
+    after = segment_confidence(wall.moved(here), [[(said_moved, pose)]], P)
     np.testing.assert_allclose(after, before, atol=0.03)
 
 
