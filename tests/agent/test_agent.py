@@ -109,10 +109,10 @@ def agent(robot: str, log: Path, team: str, endpoint: str) -> Iterator[subproces
             process.terminate()
 
 
-def mapped(robot: str, log: Path) -> RobotMap:
+def mapped(robot: str, log: Path, scans: int = SCANS) -> RobotMap:
     mapper = Mapper(robot, "x")
     for number, scan in enumerate(read_scans(log, on_warning=pytest.fail)):
-        if number < SCANS:
+        if number < scans:
             mapper.add(scan)
     return mapper.robot_map()
 

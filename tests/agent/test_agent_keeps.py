@@ -9,7 +9,7 @@ from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.session import declare_map_publisher, open_session
 from mapweave_protocol.wire import keys
-from tests.agent.test_agent import FIRST, PATIENCE, SECOND, Listener, agent, mapped
+from tests.agent.test_agent import FIRST, PATIENCE, SCANS, SECOND, Listener, agent, mapped
 
 WING = np.array([[60.0, 0.0, 460.0, 0.0], [460.0, 2.0, 60.0, 2.0]])  # [m] of bare corridor
 
@@ -25,8 +25,8 @@ def grown(robot_map: RobotMap) -> RobotMap:
 def test_a_join_is_kept_when_the_map_of_a_peer_has_grown(
     endpoint: str, team: str, logs: list[Path]
 ) -> None:
-    """The test plays the peer: it saw the same as the robot, and then a wing of the building."""
-    small = mapped(SECOND, logs[0])
+    """The test plays the peer: it saw what the robot saw and more, and then a wing beside."""
+    small = mapped(SECOND, logs[0], 3 * SCANS)
     with (
         open_session([endpoint], patience=PATIENCE) as session,
         open_session([endpoint], patience=PATIENCE) as peer,
