@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray
@@ -48,9 +49,15 @@ def coverage(lines: LineMap, parameters: CoverageParameters | None = None) -> Co
     """Return what was searched, as `lines` tell by their walls and free space."""
     p = parameters or CoverageParameters()
     free = from_rings(lines.free_space)
-    walls = shapely.MultiLineString(lines.segments.reshape(-1, 2, 2).tolist()).buffer(p.reach)
+    # Each by itself: GEOS takes ten times as long for the edge of thousands of lines at once.
+    walls = shapely.union_all(shapely.buffer(_lines(lines.segments), p.reach))
     open_ends = shapely.line_merge(shapely.difference(shapely.boundary(free), walls))
     parts = [part for part in shapely.get_parts(open_ends) if part.length >= p.min_length]
     parts.sort(key=lambda part: -part.length)
     frontiers = tuple(np.array(part.coords, dtype=np.float64) for part in parts)
     return Coverage(float(free.area), frontiers)
+
+
+def _lines(segments: FloatArray) -> NDArray[np.object_]:
+    """Return (n,) the (n, 4) `segments` as lines."""
+    return np.asarray(shapely.linestrings(segments.reshape(-1, 2, 2)))

@@ -13,7 +13,7 @@ from mapweave.maps import Alignment
 MOVED = 0.03  # [m]: as far as a scan's place in a map is known
 TURNED = np.radians(0.3)
 SURER = 0.02  # of a confidence
-GROWN = 2.0  # times the wall in common
+GROWN = 4.0  # times the wall in common
 
 
 def is_news(found: Sequence[Alignment], told: Sequence[Alignment]) -> bool:

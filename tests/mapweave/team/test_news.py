@@ -32,7 +32,7 @@ def moved(alignment: Alignment, x: float, turn: float) -> Alignment:
         moved(TOLD, 0.04, 0.0),
         moved(TOLD, 0.0, 0.01),
         replace(TOLD, confidence=0.98),
-        replace(TOLD, evidence=Evidence(common=41.0)),
+        replace(TOLD, evidence=Evidence(common=81.0)),
         replace(TOLD, other="b/1"),
     ],
 )
@@ -42,7 +42,7 @@ def test_a_decision_or_a_join_that_changed_is_news(found: Alignment) -> None:
 
 
 def test_what_comparing_again_changes_is_no_news() -> None:
-    again = replace(moved(TOLD, 0.02, 0.004), confidence=0.96, evidence=Evidence(common=39.0))
+    again = replace(moved(TOLD, 0.02, 0.004), confidence=0.96, evidence=Evidence(common=79.0))
     assert not is_news([again], [TOLD])
 
 
