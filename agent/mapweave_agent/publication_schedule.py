@@ -46,7 +46,7 @@ class AgentParameters(BaseModel):
         10.0, gt=0, description="[s] after which it is published though less was driven"
     )
     bytes_per_metre: float = Field(
-        60.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
+        50.0, gt=0, description="[1/m] of maps; settled submaps go first, growth waits for it"
     )
     bytes_per_second: float = Field(
         2.0,
