@@ -317,7 +317,7 @@ def test_growth_waits_until_the_way_has_paid_for_it() -> None:
     plan.hurry()  # what has settled does not wait
     assert plan.due(4.0)
     plan.published(4.0, size=100)
-    drive(plan, 4.5, 25.0)
+    drive(plan, 4.5, 28.0)
     assert plan.due(6.0)
 
 
