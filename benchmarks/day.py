@@ -80,12 +80,13 @@ def record(folder: Path, robots: int) -> Recording:
         folder / "store.sqlite", folder / "states", None,
     )  # fmt: skip
     recording, begun = Recording(), time.monotonic()
-    listen = {"connect": [plan.listen], "timeout": QUIET}
+    at = [plan.listen]
     with ProcessGroup(folder) as crew, ExitStack() as stack:
         start_router(crew, plan)
-        stack.enter_context(_noting(recording.maps, robot_maps(TEAM, **listen), begun))  # type: ignore[arg-type]
-        stack.enter_context(_noting(recording.decisions, alignments(TEAM, **listen), begun))  # type: ignore[arg-type]
-        stack.enter_context(_noting(recording.poses, poses(TEAM, **listen), begun))  # type: ignore[arg-type]
+        keep, said = stack.enter_context, recording
+        keep(_noting(said.maps, robot_maps(TEAM, connect=at, timeout=QUIET), begun))
+        keep(_noting(said.decisions, alignments(TEAM, connect=at, timeout=QUIET), begun))
+        keep(_noting(said.poses, poses(TEAM, connect=at, timeout=QUIET), begun))
         start_server(crew, plan, plan.store)
         for member in plan.members:
             start_agent(crew, plan, member)

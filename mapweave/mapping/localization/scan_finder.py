@@ -32,7 +32,7 @@ class ScanFinderParameters(StageParameters):
     """How a scan is looked for, and what a place must show to be the one.
 
     Set on scans of the later parts of fr079, Intel and CSAIL, in maps of the first
-    (``python -m benchmarks localize``).
+    (``python -m benchmarks relocalize``).
     """
 
     raster: DistanceFieldParameters = derived(DistanceFieldParameters.of)

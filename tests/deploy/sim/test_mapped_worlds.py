@@ -1,6 +1,7 @@
 """What robots make of worlds that are hard: the place as it is, and joined where it is one place.
 
-Round rooms, bare halls and ramps are not here: robots are off there without a word.
+Round rooms, bare halls and ramps are not here: robots are off there, and say so mostly
+(``python -m benchmarks robots``).
 """
 
 import json
