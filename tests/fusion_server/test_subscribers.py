@@ -203,7 +203,6 @@ def test_a_subscriber_that_was_asleep_longer_than_its_lease_gets_every_version_i
         subscriber.kill()
 
 
-@pytest.mark.slow  # one run in some fifteen, on a busy machine, hears no third version within 30 s
 def test_of_two_coordinators_both_hold_all_and_a_subscriber_follows_one_until_it_ends(
     network: Network, start_server: StartServer, found: Found, tmp_path: Path
 ) -> None:

@@ -174,8 +174,13 @@ class JointSequence:
         self._waiting = {n: message for n, message in self._waiting.items() if n <= latest}
 
     def _pass_over_history(self, messages: Sequence[JointMapMessage]) -> None:
-        """Where a store began another series, what is of the one before is history."""
-        before = [m.version for m in messages if m.series != self._series]
+        """Where a store began another series, what is of the one before is history.
+
+        Only what lies below all that is of the series followed is of such a store: another
+        coordinator numbers as it likes.
+        """
+        own = min((m.version for m in messages if m.series == self._series), default=0)
+        before = [m.version for m in messages if m.version < own]
         if before and self._last is not None and self._last < max(before) <= SHORT_HISTORY:
             self._last = max(before)
 

@@ -161,6 +161,24 @@ def test_of_two_coordinators_that_answer_the_one_followed_is_kept() -> None:
     assert taken(sequence) == [8]
 
 
+@pytest.mark.parametrize("others", [[3], [3, 4, 5], [4]])
+@pytest.mark.parametrize("own", [[3], [3, 4], []])
+def test_another_coordinator_that_has_come_as_far_hides_no_version_of_the_one_followed(
+    own: list[int], others: list[int]
+) -> None:
+    sequence = JointSequence(whole_up_to=0)
+    sequence.offer(message(2))
+    delivered = taken(sequence)
+    sequence.expect("s1", 4)
+    assert sequence.gap == JointQuery(since=2, limit=ASKED_AT_ONCE)
+    answers = [*(message(n) for n in own), *(message(n, "s2") for n in others)]
+    sequence.answered(sequence.gap, answers)
+    for version in (3, 4):
+        sequence.offer(message(version))
+        delivered += taken(sequence)
+    assert delivered == [2, 3, 4]
+
+
 def test_another_store_is_followed_once_its_coordinator_answers() -> None:
     sequence = JointSequence(whole_up_to=0)
     sequence.offer(message(9))
