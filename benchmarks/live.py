@@ -24,6 +24,8 @@ from mapweave_deploy.run.launcher import free_endpoint
 from mapweave_deploy.sim.lidar import LidarParameters, measure
 from mapweave_deploy.sim.office import office
 from mapweave_deploy.sim.trajectories import TourParameters, plan_tours
+from mapweave_protocol.link.asking import request_statuses
+from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import decode
@@ -31,6 +33,7 @@ from mapweave_protocol.wire.messages import PoseMessage, StatusMessage
 
 TEAM, ROBOT, TOPIC = "live", "r1", "/scan"
 DRAINED = 2.0  # [s] after the last scan, in which its pose comes
+LATE, WAITED = 50.0, 50.0  # [ms]: a pose after its scan at most; a scan beyond one period
 PATIENCE = 30.0  # [s]
 HEAD = ["Hz", "sent", "mapped", "skipped", "oldest ms", "pose p50 ms", "pose p99 ms", "components"]
 
@@ -48,6 +51,19 @@ class Outcome:
     pose_p99: float
     components: int
 
+    def shortfalls(self) -> Iterator[str]:
+        """Yield which bars are not held, in words with figure, bar and ratio."""
+        lost = self.sent - self.mapped - self.skipped
+        if lost:
+            yield f"{self.rate:g} Hz: {lost} scans neither mapped nor told as skipped"
+        bars = {
+            "oldest scan": (self.oldest, 1000 / self.rate + WAITED),
+            "pose p99": (self.pose_p99, LATE),
+        }
+        for name, (figure, bar) in bars.items():
+            if figure > bar:
+                yield f"{self.rate:g} Hz: {name} {figure:g} ms, bar {bar:g}, {figure / bar:.2f} x"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say how fast and how long."""
@@ -61,6 +77,10 @@ def run(options: argparse.Namespace) -> None:
     rows = [[f"{value:g}" for value in asdict(outcome).values()] for outcome in outcomes]
     print(format_table(HEAD, rows))
     write_json(OUTPUT / "live.json", [asdict(outcome) for outcome in outcomes])
+    short = [line for outcome in outcomes for line in outcome.shortfalls()]
+    print("\n".join(short or ["all bars held"]))
+    if short:
+        sys.exit(1)
 
 
 def _drive(rate: float, seconds: float) -> Outcome:
@@ -93,6 +113,9 @@ def _measure(session: zenoh.Session, rate: float, messages: list[tuple[float, by
     def hear_status(sample: zenoh.Sample) -> None:
         statuses.append(decode(StatusMessage, sample.payload.to_bytes()))
 
+    def hear_answer(arrival: Arrival) -> None:
+        statuses.append(decode(StatusMessage, arrival.payload))
+
     where = {"team": TEAM, "robot": ROBOT}
     key = f"0{TOPIC}/sensor_msgs::msg::dds_::LaserScan_/TypeHashNotSupported"
     with (
@@ -109,7 +132,12 @@ def _measure(session: zenoh.Session, rate: float, messages: list[tuple[float, by
             sent[round(stamp, 3)] = time.monotonic()
             sensor.put(payload)
         time.sleep(DRAINED)
-    last, ages = statuses[-1], [s.scan_age for s in statuses if s.scan_age is not None]
+        ages = [s.scan_age for s in statuses if s.scan_age is not None]
+        before = len(statuses)
+        request_statuses(session, TEAM, hear_answer)  # how it is now, not when it last said so
+        while len(statuses) == before:
+            time.sleep(0.1)
+    last = statuses[-1]
     p50, p99 = np.percentile(waited, [50, 99]) * 1e3
     oldest = round(max(ages) * 1e3, 1)
     times = round(float(p50), 1), round(float(p99), 1)

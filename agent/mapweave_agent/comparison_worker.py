@@ -18,7 +18,7 @@ from mapweave_protocol.wire.pairs import told_apart
 
 Aligner: TypeAlias = Callable[[RobotMap, RobotMap], Sequence[Alignment]]
 
-NICENESS = 10  # mapping comes first where processors are few
+NICENESS = 19  # all else comes first where processors are few: mapping, versions
 
 
 @dataclass(frozen=True, slots=True)
