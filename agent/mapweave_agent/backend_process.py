@@ -12,7 +12,7 @@ from mapweave.mapping.backend import Backend, BackendParameters, BackendResult, 
 from mapweave.maps import Submap
 from mapweave_agent.worker import Worker, answer
 
-NICENESS = 5  # tracking comes first where processors are few
+NICENESS = 10  # tracking comes first where processors are few, and versions of the joint map
 
 _log = logging.getLogger(__name__)
 

@@ -47,7 +47,7 @@ class CoordinatorParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    min_interval: float = Field(default=2.0, ge=0, allow_inf_nan=False)
+    min_interval: float = Field(default=1.0, ge=0, allow_inf_nan=False)
     """Least time between two versions [s] unless an alignment is joined or revoked: a person
     watching sees the map grow. Of a large team building takes longer; the next one waits."""
 

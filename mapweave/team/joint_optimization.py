@@ -28,7 +28,7 @@ class JointOptimizationParameters(StageParameters):
     """Which submaps are compared, and what alignments are worth beside that."""
 
     loops: LoopParameters = derived(
-        lambda c: LoopParameters.of(c, min_drift=0.9, min_turn=0.1, remembered=512)
+        lambda c: LoopParameters.of(c, min_drift=0.9, min_turn=0.1, remembered=128)
     )
     candidates: int = Field(2, ge=1, description="submaps of each component compared, the nearest")
     most: int = Field(6, ge=1, description="submaps compared with one in all, the nearest")

@@ -161,7 +161,7 @@ def test_stages_within_a_stage_keep_what_is_their_own() -> None:
     assert simplification.selection.price == 0.03
     assert (joint.merging.max_step, joint.merging.max_cost) == (0.25, 0.2)
     loops = weaving.loops
-    assert (loops.min_drift, loops.min_turn, loops.remembered) == (0.9, 0.1, 512)
+    assert (loops.min_drift, loops.min_turn, loops.remembered) == (0.9, 0.1, 128)
 
 
 @pytest.mark.parametrize(("section", "name"), [

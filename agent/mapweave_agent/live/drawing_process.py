@@ -11,7 +11,7 @@ from mapweave.mapping.map_snapshot import draw_here
 from mapweave.maps import LineMap
 from mapweave_agent.worker import Worker, answer
 
-NICENESS = 10  # tracking and mapping come first where processors are few
+NICENESS = 12  # tracking and mapping come first where processors are few
 
 _log = logging.getLogger(__name__)
 
