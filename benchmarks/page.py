@@ -5,11 +5,12 @@ import gc
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
+from typing import TypeAlias
 
 import numpy as np
 from playwright.sync_api import CDPSession, Page
@@ -28,7 +29,8 @@ from mapweave_protocol.wire.messages import JointMapMessage
 from tests.fusion_server.web.browser import chromium, visit
 
 ROBOTS, SCANS, RATE = 20, 400, 10.0  # scans of each, and reports a second
-PAN_STEPS, SHOWN = 200, 12
+PAN_STEPS, SHOWN = 200, 12  # and versions of each kind that are timed
+PAUSE = 500  # [ms] between two of them: a coordinator makes one a second at the most
 ROOM = 4.0  # [m]
 WATCH = """
 window.painted = {}; window.frames = 0;
@@ -63,13 +65,15 @@ class Bench:
     joint: JointMap
     maps: tuple[RobotMap, ...]
 
-    def publish(self, version: int) -> float:
+    def publish(self, changed: "Change | None" = None) -> float:
         """Publish a version; return when it was handed over [s since 1970]."""
-        joint = JointMap(version, self.joint.components, ())
-        payload = encode(JointMapMessage.pack(joint, self.store.series))
-        self.store.add_version(version, time.time(), payload)
+        version = self.store.latest_version + 1
+        joint, maps = (self.joint, self.maps) if changed is None else changed(self, version)
+        joint = replace(joint, version=version)
+        message = JointMapMessage.pack(joint, self.store.series)
+        self.store.add_version(version, time.time(), encode(message))
         handed = time.time()
-        self.feed.show_version(version, self.maps)
+        self.feed.show_version(version, maps, message)
         return handed
 
     def painted(self, version: int) -> float:
@@ -116,7 +120,7 @@ def _opened(joint: JointMap, maps: tuple[RobotMap, ...]) -> Iterator[Bench]:
         cdp = seen.tab.context.new_cdp_session(seen.tab)
         cdp.send("Performance.enable")
         bench = Bench(store, feed, seen.tab, cdp, joint, maps)
-        bench.publish(1)
+        bench.publish()
         seen.tab.add_init_script(WATCH)
         seen.tab.goto(address.url())
         bench.painted(1)
@@ -126,18 +130,54 @@ def _opened(joint: JointMap, maps: tuple[RobotMap, ...]) -> Iterator[Bench]:
 def _measure(bench: Bench) -> dict[str, float]:
     """Return what opening, following and panning costs, in milliseconds."""
     opened = bench.painted(1) * 1000 - float(bench.tab.evaluate("performance.timeOrigin"))
-    delays = []
-    for version in range(2, SHOWN):
-        handed = bench.publish(version)
-        delays.append(1000 * (bench.painted(version) - handed))
+    delays: dict[str, float] = {}
+    for name, change in CHANGES.items():
+        taken = [_delay(bench, change) for _ in range(SHOWN)]
+        delays[f"publication to paint, {name}, median [ms]"] = median(taken)
+        delays[f"publication to paint, {name}, longest [ms]"] = max(taken)
     script, frames = _pan(bench)
     return {
         "map painted after opening [ms]": opened,
-        "publication to paint, median [ms]": median(delays),
-        "publication to paint, longest [ms]": max(delays),
+        **delays,
         "script a frame while panning [ms]": 1000 * script / frames,
         "frames drawn": frames,
     }
+
+
+def _delay(bench: Bench, change: "Change | None") -> float:
+    """Return how long after it was handed over a version is painted [ms]."""
+    bench.tab.wait_for_timeout(PAUSE)
+    handed = bench.publish(change)
+    return 1000 * (bench.painted(bench.store.latest_version) - handed)
+
+
+def _a_little(bench: Bench, version: int) -> tuple[JointMap, tuple[RobotMap, ...]]:
+    """Return a version in which a room was moved by a centimetre, and a robot drove on."""
+    (component,) = bench.joint.components
+    segments = component.map.segments.copy()
+    room = 4 * (version % (len(segments) // 4))
+    segments[room : room + 4] += 0.01
+    lines = replace(component.map, segments=segments)
+    joint = replace(bench.joint, components=(replace(component, map=lines),))
+    robot = version % len(bench.maps)
+    grown = replace(bench.maps[robot], version=version)
+    return joint, (*bench.maps[:robot], grown, *bench.maps[robot + 1 :])
+
+
+def _all_of_it(bench: Bench, version: int) -> tuple[JointMap, tuple[RobotMap, ...]]:
+    """Return a version in which every wall and every path moved, as when a loop is closed."""
+    (component,) = bench.joint.components
+    lines = component.map.moved(np.array([0.01 * (version % 7), 0.0, 0.0]))
+    joint = replace(bench.joint, components=(replace(component, map=lines),))
+    return joint, tuple(replace(each, version=version) for each in bench.maps)
+
+
+Change: TypeAlias = Callable[[Bench, int], tuple[JointMap, tuple[RobotMap, ...]]]
+CHANGES: dict[str, Change | None] = {
+    "nothing changed": None,
+    "a room and a robot": _a_little,
+    "everything": _all_of_it,
+}
 
 
 def _pan(bench: Bench) -> tuple[float, int]:
@@ -167,11 +207,11 @@ def _report(feed: Feed, ended: threading.Event) -> None:
 def _feed(bench: Bench, versions: int) -> dict[str, float]:
     """Return what page and server hold [MB] after a third of many versions, and after all."""
     held: list[tuple[float, float]] = []
-    for version in range(SHOWN, SHOWN + versions):
-        bench.publish(version)
+    for fed in range(versions):
+        bench.publish(_a_little)
         bench.tab.wait_for_timeout(1)
-        if version - SHOWN in (versions // 3, versions - 1):
-            bench.painted(version)
+        if fed in (versions // 3, versions - 1):
+            bench.painted(bench.store.latest_version)
             held.append(bench.memory())
     (page, server), (page_then, server_then) = held
     return {

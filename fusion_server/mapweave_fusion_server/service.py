@@ -166,7 +166,7 @@ class Service:
             self._frames = frames_of(built.joint)
             self._look_due = 0.0
             self._speaking.hurry()  # robots wait for their new frames
-            self._feed.show_version(built.draft.version, built.draft.maps)
+            self._feed.show_version(built.draft.version, built.draft.maps, kept.message)
             record(self._story.joined(built.joint))
         self._coordinator.finish(built.joint if built else None)
 

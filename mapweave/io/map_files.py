@@ -9,7 +9,7 @@ import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -143,14 +143,18 @@ def write_joint(path: str | Path, joint: JointMap) -> None:
     _write(path, joint_content(joint))
 
 
-def joint_content(joint: JointMap) -> dict[str, object]:
-    """Return what is in the file of `joint`, for `json.dumps`."""
+def joint_content(joint: JointMap, *, searched: bool = True) -> dict[str, Any]:
+    """Return what is in the file of `joint`, for `json.dumps`; on request without coverage.
+
+    What was searched takes longer to work out than all the rest.
+    """
+    components = [_component(component, searched=searched) for component in joint.components]
     return {
         "format": JOINT_FORMAT,
         "version": joint.version,
         **_made_with(joint.made_with),
         "alignments": [alignment_content(alignment) for alignment in joint.alignments],
-        "components": [_component(component) for component in joint.components],
+        "components": components,
         **listed("orders", map(order_content, joint.orders)),
     }
 
@@ -294,16 +298,23 @@ def _cause(cause: Reason) -> dict[str, object]:
     return {"kind": cause.kind, **numbers, **text, **found}
 
 
-def _component(component: JointComponent) -> dict[str, object]:
+def coverage_content(lines: LineMap) -> dict[str, Any]:
+    """Return the fields of a joint component that tell what was searched."""
+    found = coverage(lines)
+    return {
+        "explored_m2": round(found.explored, 1),
+        "frontiers": [np.round(line, _METRES).tolist() for line in found.frontiers],
+    }
+
+
+def _component(component: JointComponent, *, searched: bool) -> dict[str, object]:
     confidences = np.round(component.segment_confidence, _METRES).tolist()
-    searched = coverage(component.map)
     return {
         "robots": {name: _pose(pose) for name, pose in component.robots.items()},
         "confidence": _number(component.confidence, _RATIOS),
         **_line_map(component.map),
         "segment_confidence": _by_polyline(component.map, confidences),
-        "explored_m2": round(searched.explored, 1),
-        "frontiers": [np.round(line, _METRES).tolist() for line in searched.frontiers],
+        **(coverage_content(component.map) if searched else {}),
         **listed("marks", map(placed_mark_content, component.marks)),
     }
 

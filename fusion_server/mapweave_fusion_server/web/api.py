@@ -22,9 +22,9 @@ from mapweave_fusion_server.web.downloads import (
 )
 from mapweave_fusion_server.web.events import Bell, Stream, after_of
 from mapweave_fusion_server.web.evidence import evidence_content
-from mapweave_fusion_server.web.history import to_json
 from mapweave_fusion_server.web.knowledge import Knowledge
 from mapweave_fusion_server.web.parts import part_content, scene_of
+from mapweave_fusion_server.web.versions.json_text import to_json
 
 DEFAULT_LIMIT, MAX_LIMIT = 10, 100  # whole versions in one answer
 MAX_LISTED = 100_000  # numbers and times of versions in one answer
@@ -108,8 +108,11 @@ class Api:
     async def _paths(self, request: Request) -> Response:
         """Answer with the paths of a version, or that they are no longer kept."""
         number = request.path_params["number"]
-        nothing = {"version": number, "kept": False, "components": {}, "robots": {}}
-        return _json(self._known.paths.json(number) or to_json(nothing))
+        paths = self._known.paths.of(number)
+        if paths is None:
+            nothing = {"version": number, "kept": False, "components": {}, "robots": {}}
+            return _json(to_json(nothing))
+        return _json(b'{"version":%d,"kept":true,%s' % (number, paths.json()[1:]))
 
     async def _part(self, request: Request) -> Response:
         """Answer with a robot's own lines of a component, as they are now."""

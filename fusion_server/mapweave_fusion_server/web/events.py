@@ -1,9 +1,11 @@
 """Server-sent events: what changed, as it changes.
 
 An event ``version`` for each version, its number as the event's id: who comes again with the last
-id it had (as browsers do by themselves) gets all that it missed, in order. Beside these, without an
-id: ``team`` when robots or coordinator were reported, ``story`` with lines of the journal,
-``poses`` where the robots are, ten times a second at the most.
+id it had (as browsers do by themselves) gets all that it missed, in order. Who had the version
+before is told in it what changed, if that version has just been made. Beside these, without an id:
+``searched`` with the coverage of the latest version, which takes longer to work out, ``team`` when
+robots or coordinator were reported, ``story`` with lines of the journal, ``poses`` where the robots
+are, ten times a second at the most.
 
 Each client is served at its own pace from the store; nothing is queued for a slow one.
 """
@@ -14,8 +16,9 @@ from contextlib import suppress
 
 from starlette.concurrency import run_in_threadpool
 
-from mapweave_fusion_server.web.history import History, to_json
 from mapweave_fusion_server.web.knowledge import Knowledge
+from mapweave_fusion_server.web.versions.history import History
+from mapweave_fusion_server.web.versions.json_text import to_json
 
 AT_ONCE = 256  # versions read from the store
 PING = 15.0  # [s] after which a client that is gone is noticed
@@ -72,6 +75,8 @@ class Stream:
         # Of another store it may have a version that is still to come here.
         self._version = max(0, latest - 1) if after is None or after > latest else after
         self._line = knowledge.story.count
+        self._has_one = after is not None
+        self._searched = 0
         self._team = b""
         self._poses = 0
 
@@ -90,9 +95,12 @@ class Stream:
     async def _news(self) -> AsyncIterator[bytes]:
         while created := await run_in_threadpool(self._versions):
             for number, time in created:
-                content = {"version": number, "created": time, "series": self._history.series}
-                yield _event("version", to_json(content), number)
-                self._version = number
+                yield _event("version", await run_in_threadpool(self._told, number, time), number)
+                self._version, self._has_one = number, True
+        searched = self._knowledge.searching.found
+        if searched is not None and self._searched < searched.version <= self._version:
+            self._searched = searched.version
+            yield _event("searched", searched.text)
         team = self._knowledge.team_json()
         if team != self._team:
             self._team = team
@@ -120,6 +128,15 @@ class Stream:
     @property
     def _history(self) -> History:
         return self._knowledge.history
+
+    def _told(self, number: int, time: float) -> bytes:
+        """Return what is told of a version, with what changed to who had the one before it."""
+        content = to_json({"version": number, "created": time, "series": self._history.series})
+        changes = self._knowledge.changes_json(number) if self._has_one else None
+        if changes is None:
+            return content
+        self._knowledge.searching.ask(number)
+        return b'%s,"changes":%s}' % (content[:-1], changes)
 
     def _versions(self) -> list[tuple[int, float]]:
         # Paths are kept a moment after the version is stored: who is told finds both.

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from mapweave.maps import RobotMap
 from mapweave_fusion_server.web.positions import Positions
-from mapweave_protocol.wire.messages import OrderMessage, StatusMessage
+from mapweave_protocol.wire.messages import JointMapMessage, OrderMessage, StatusMessage
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +83,13 @@ class Seen:
         The number of the latest version, 0 when there is none.
     maps
         The robots' maps that it was made of, one for each run.
+    message
+        What says it, complete; None where it is only in the store.
     """
 
     version: int = 0
     maps: tuple[RobotMap, ...] = ()
+    message: JointMapMessage | None = None
     robots: tuple[RobotReport, ...] = ()
     coordinator: CoordinatorReport = field(default_factory=CoordinatorReport)
 
@@ -151,10 +154,12 @@ class Feed:
             self._orders.clear()
         return waiting
 
-    def show_version(self, version: int, maps: tuple[RobotMap, ...]) -> None:
-        """Hand over that `version` is in the store, made of `maps`."""
+    def show_version(
+        self, version: int, maps: tuple[RobotMap, ...], message: JointMapMessage | None = None
+    ) -> None:
+        """Hand over that `version` is in the store, made of `maps`, and what says it."""
         with self._lock:
-            self._seen = replace(self._seen, version=version, maps=maps)
+            self._seen = replace(self._seen, version=version, maps=maps, message=message)
         self._tell()
 
     def show_team(self, robots: tuple[RobotReport, ...], coordinator: CoordinatorReport) -> None:

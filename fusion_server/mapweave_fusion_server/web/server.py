@@ -27,10 +27,11 @@ from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.api import Api
 from mapweave_fusion_server.web.events import Bell
 from mapweave_fusion_server.web.feed import Feed, Seen
-from mapweave_fusion_server.web.history import History
 from mapweave_fusion_server.web.knowledge import Knowledge
 from mapweave_fusion_server.web.orders import PageOrders
 from mapweave_fusion_server.web.story import StoryTail
+from mapweave_fusion_server.web.versions.history import History
+from mapweave_fusion_server.web.versions.searching import Searching
 from mapweave_protocol.link.guard.refusals import Refusals
 from mapweave_protocol.link.security.folder import AUTHORITY, CERTIFICATE, KEY, KeyFolder
 
@@ -65,9 +66,9 @@ def live_page(
     ArgumentError
         If nothing can be served there.
     """
-    bell = Bell()
-    with StoryTail(bell.ring) as story:
-        knowledge = Knowledge(team, config, feed, History(store), story)
+    bell, history = Bell(), History(store)
+    with StoryTail(bell.ring) as story, Searching(history, bell.ring) as searching:
+        knowledge = Knowledge(team, config, feed, history, story, searching)
         with serving(address, knowledge, bell, token) as bound:
             yield bound
 
@@ -116,18 +117,17 @@ def application(knowledge: Knowledge, bell: Bell, refusals: Refusals) -> ASGIApp
 
 @contextmanager
 def _keeping_up(knowledge: Knowledge, bell: Bell) -> Iterator[None]:
-    """Keep the paths of each version that is handed over, beside the coordinator, and ring."""
+    """Take each version that is handed over, beside the coordinator, and ring."""
 
-    def keep(seen: Seen) -> None:
-        if seen.version > knowledge.paths.latest:
-            knowledge.paths.keep(seen.version, seen.maps)
+    def take(seen: Seen) -> None:
+        knowledge.take(seen)
         bell.ring()
 
     with (
-        ThreadPoolExecutor(1, thread_name_prefix="paths") as worker,
-        knowledge.feed.heard_by(lambda seen: worker.submit(keep, seen)),
+        ThreadPoolExecutor(1, thread_name_prefix="versions") as worker,
+        knowledge.feed.heard_by(lambda seen: worker.submit(take, seen)),
     ):
-        worker.submit(keep, knowledge.feed.seen)
+        worker.submit(take, knowledge.feed.seen)
         yield
 
 

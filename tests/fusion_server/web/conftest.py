@@ -83,9 +83,9 @@ class Page:
 
     def publish(self, joint: JointMap, maps: tuple[RobotMap, ...] = ()) -> None:
         """Store a version and hand it over, as the coordinator does."""
-        payload = encode(JointMapMessage.pack(joint, self.store.series))
-        self.store.add_version(joint.version, 1000.0 + joint.version, payload)
-        self.feed.show_version(joint.version, maps)
+        message = JointMapMessage.pack(joint, self.store.series)
+        self.store.add_version(joint.version, 1000.0 + joint.version, encode(message))
+        self.feed.show_version(joint.version, maps, message)
 
     @contextmanager
     def events(self, headers: Headers | None = None) -> Iterator[Iterator[dict[str, str]]]:

@@ -82,11 +82,18 @@ def test_components_move_together_before_ones_eyes(page: Page, seen: Visit, line
     seen.tab.evaluate(RECORD_MOVES)
     page.publish(make_joint(2, lines, a=0.0, b=0.0))
     expect_version(seen.tab, 2)
-    seen.tab.wait_for_timeout(2000)
+    until_still(seen.tab)
     assert seen.tab.evaluate("window.placesDrawn.size") > 8  # each component, on its way
-    still = picture(seen.tab)
-    seen.tab.wait_for_timeout(300)
-    assert picture(seen.tab) == still
+
+
+def until_still(tab: Tab) -> bytes:
+    """Return the picture when it has come to rest."""
+    for _ in range(100):
+        before = picture(tab)
+        tab.wait_for_timeout(1000)  # as long as components move
+        if picture(tab) == before:
+            return before
+    raise AssertionError("the picture goes on changing")
 
 
 RECORD_MOVES = """() => {
@@ -128,6 +135,46 @@ def until_other(tab: Tab, shown: bytes) -> bytes:
             return picture(tab)
         tab.wait_for_timeout(100)
     raise AssertionError("the picture stays")
+
+
+def test_what_follows_is_made_of_what_changed_and_not_fetched(
+    page: Page, seen: Visit, lines: LineMap, make_map: MakeMap
+) -> None:
+    """Robots come and go, components are joined, walls go: it is what is told of the whole."""
+    maps = make_map("a"), make_map("b")
+    page.publish(make_joint(1, lines, a=0.0), maps[:1])
+    expect_version(seen.tab, 1)
+    fetched = len(seen.asked)
+    later = (
+        (apart(2, lines, "a", "b"), maps),
+        (with_marks(make_joint(3, lines, a=0.0, b=3.0), "victim"), maps),
+        (make_joint(4, replace_segments(lines, 4), a=0.0, b=3.0), maps[1:]),
+    )
+    for joint, robot_maps in later:
+        page.publish(joint, robot_maps)
+        expect_version(seen.tab, joint.version)
+    expect(seen.tab.locator("#legend")).to_contain_text("the search goes on")
+    assert not [url for url in seen.asked[fetched:] if "/api/joint/" in url]
+    for version in (2, 3, 4):
+        with page.events({"Last-Event-ID": str(version - 1)}) as events:
+            event = next(event for event in events if event["event"] == "version")
+        changes = json.loads(event["data"])["changes"]
+        made, paths = json.loads(seen.tab.evaluate(MAKE_NEXT, [version, changes]))
+        whole = page.ask(f"/api/joint/{version}").json
+        for component in (*made["components"], *whole["components"]):
+            component.pop("frontiers", None)  # what was searched is told apart
+            component.pop("explored_m2", None)
+        assert made == whole
+        assert paths == page.ask(f"/api/joint/{version}/paths").json
+
+
+MAKE_NEXT = """async ([version, changes]) => {
+  const { nextJoint, nextPaths } = await import("/static/next.js");
+  const before = await Promise.all(["", "/paths"].map(async (what) =>
+    (await fetch(`/api/joint/${version - 1}${what}`)).json()));
+  const joint = nextJoint(before[0], version, changes);
+  return JSON.stringify([joint, nextPaths(before[1], version, changes.paths)]);
+}"""
 
 
 def test_the_slider_goes_back_and_the_map_is_that_versions(

@@ -8,7 +8,6 @@ import pytest
 from mapweave.maps import LineMap
 from mapweave_fusion_server import journal
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
-from mapweave_fusion_server.web.parts import Paths
 from tests.fusion_server.web.conftest import Page, make_joint, make_pose
 
 
@@ -92,13 +91,39 @@ def test_paths_are_there_when_their_version_is_told(page: Page, lines: LineMap) 
             assert page.ask(f"/api/joint/{number}/paths").json["kept"] is True
 
 
-def test_paths_of_old_versions_go_when_there_are_too_many() -> None:
-    paths = Paths(limit=400)
-    for version in range(1, 50):
-        paths.keep(version, ())
-    assert paths.latest == 49
-    assert paths.json(49) is not None
-    assert paths.json(1) is None
+def test_who_had_the_version_before_is_told_what_changed_and_who_had_not_is_not(
+    page: Page, lines: LineMap
+) -> None:
+    publish(page, lines, 1, 2)
+    with page.events() as events, page.events({"Last-Event-ID": "1"}) as others:
+        versions = (event for event in events if event["event"] == "version")
+        assert "changes" not in json.loads(next(versions)["data"])  # it asks for all of it
+        told = json.loads(next(e for e in others if e["event"] == "version")["data"])
+        assert (told["version"], told["changes"]["components"][0]["was"]) == (2, 0)
+        page.publish(make_joint(3, lines, a=0.0, b=3.0))
+        told = json.loads(next(versions)["data"])
+    (change,) = told["changes"]["components"]
+    polylines = len(page.ask("/api/joint/2").json["components"][0]["polylines"])
+    assert change["walls"] == [[0, polylines]]
+    assert set(change["robots"]) == {"a/0", "b/0"}
+    assert told["changes"]["paths"]["components"] == {}
+
+
+def test_what_was_searched_is_told_after_the_version(page: Page, lines: LineMap) -> None:
+    publish(page, lines, 1, 1)
+    with page.events() as events:
+        assert next(event for event in events if event["event"] == "version")["id"] == "1"
+        publish(page, lines, 2, 2)
+        told = [e for e in islice(events, 3) if e["event"] in ("version", "searched")][-2:]
+    assert [event["event"] for event in told] == ["version", "searched"]
+    assert "id" not in told[1]
+    searched = json.loads(told[1]["data"])
+    whole = page.ask("/api/joint/2").json
+    assert searched["version"] == 2
+    assert searched["components"] == [
+        {name: component[name] for name in ("explored_m2", "frontiers")}
+        for component in whole["components"]
+    ]
 
 
 def test_who_no_longer_listens_is_not_told() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mapweave.geometry.segments import cross, lengths, sample, units
+from mapweave.geometry.segments import cross, lengths, near_intervals, sample, units
 
 SEGMENTS = np.array([[0.0, 0, 3, 4], [1, 1, 1, 1], [2, 0, 2, -1]])
 
@@ -26,3 +26,22 @@ def test_samples_stand_for_equal_parts_that_add_up_to_the_segment() -> None:
     assert found.owner.tolist() == [0, 0, 0, 1]
     np.testing.assert_allclose(found.lengths, [5 / 3] * 3 + [1])
     np.testing.assert_allclose(found.points[1], [1.5, 2])
+
+
+def test_what_is_within_reach_of_a_wall_is_one_interval_of_a_segment() -> None:
+    """As distances of many points tell; walls of no length are points."""
+    random = np.random.default_rng(3)
+    segments, walls = random.uniform(0, 4, (2, 300, 4))
+    walls[::10, 2:] = walls[::10, :2]
+    walls[5::10] = segments[5::10] + 0.3  # alongside
+    first, last = near_intervals(segments, walls, 0.7)
+    share = np.linspace(0, 1, 401)
+    for segment, wall, begin, end in zip(segments, walls, first, last, strict=True):
+        points = segment[:2] + share[:, None] * (segment[2:] - segment[:2])
+        along = wall[2:] - wall[:2]
+        nearest = (points - wall[:2]) @ along / max(along @ along, 1e-12)
+        foot = wall[:2] + np.clip(nearest, 0, 1)[:, None] * along
+        distance = np.linalg.norm(points - foot, axis=1)
+        clear = np.abs(distance - 0.7) > 1e-9
+        inside = (begin <= share) & (share <= end)
+        np.testing.assert_array_equal(inside[clear], distance[clear] < 0.7)

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+import shapely
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
-from mapweave.scan.coverage import coverage
+from mapweave.scan.coverage import CoverageParameters, coverage
 
 KEPT = 0.15  # [m] that free space keeps from walls
 
@@ -77,3 +78,21 @@ def test_where_nothing_was_seen_to_be_free_nothing_is_searched(
 def test_without_walls_all_of_the_outline_is_a_frontier() -> None:
     square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
     assert sum(length(line) for line in coverage(line_map([], square)).frontiers) == 8.0
+
+
+def test_frontiers_are_what_is_left_beyond_the_reach_of_all_walls() -> None:
+    """As areas tell: walls made as wide as they reach, cut out of the outline."""
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        starts = random.uniform(0, 10, (12, 2))
+        walls = np.hstack([starts, starts + random.normal(0, 1.5, (12, 2))])
+        angle = np.sort(random.uniform(0, 2 * np.pi, 7))
+        ring = 5 + 4 * np.column_stack([np.cos(angle), np.sin(angle)])
+        every = CoverageParameters(min_length=1e-3)
+        found = coverage(line_map(walls.tolist(), ring.tolist()), every)
+        lines = shapely.linestrings(walls.reshape(-1, 2, 2))
+        wide = shapely.union_all(shapely.buffer(lines, every.reach, quad_segs=200))
+        open_ends = shapely.difference(shapely.boundary(shapely.Polygon(ring)), wide)
+        assert sum(map(length, found.frontiers)) == pytest.approx(open_ends.length, abs=0.02)
+        for frontier in found.frontiers:
+            assert shapely.covers(shapely.buffer(open_ends, 0.01), shapely.LineString(frontier))

@@ -6,6 +6,7 @@ import { Evidence } from "./evidence.js";
 import { clock, counted, percent, robotOf } from "./format.js";
 import { fillLegend } from "./legend.js";
 import { MapView } from "./map.js";
+import { nextJoint, nextPaths } from "./next.js";
 import { fillMarks, fillOrders, learnOperator } from "./orders.js";
 import { onThemeChange, setRobots } from "./palette.js";
 import { fetchJson, follow } from "./source.js";
@@ -14,7 +15,7 @@ import { fillTeam, writeCoordinator } from "./team.js";
 import { Timeline } from "./timeline.js";
 
 const MAX_LINES = 300;
-const state = { joint: null, team: null, lastLine: 0, wanted: 0, loading: false, against: null };
+const state = { joint: null, paths: null, team: null, lastLine: 0, wanted: 0, loading: false, against: null };
 
 const map = new MapView(byId("map"), {
   measured: (text) => {
@@ -36,10 +37,14 @@ function showWhy(joint, index, pin) {
   return evidence.show(joint, index, pin);
 }
 
-/** Load a version and show it; of several asked for meanwhile, only the last. */
-async function load(version) {
+/** Show a version: made of the one before it if it can, or loaded; of several asked for, the last. */
+async function load(version, changes) {
   state.wanted = version;
   if (state.loading) return;
+  if (changes && follows(version)) {
+    show(nextJoint(state.joint, version, changes), nextPaths(state.paths, version, changes.paths));
+    return;
+  }
   state.loading = true;
   if (!state.joint) write(byId("headline"), "Loading the map…");
   try {
@@ -47,15 +52,25 @@ async function load(version) {
       const number = state.wanted;
       const [joint, paths] = await Promise.all([fetchJson(`/api/joint/${number}`), fetchJson(`/api/joint/${number}/paths`)]);
       if (joint === null) break;
-      state.joint = Object.assign(joint, { series: timeline.series });
-      show(joint, paths);
+      show(Object.assign(joint, { series: timeline.series }), paths);
     }
   } finally {
     state.loading = false;
   }
 }
 
+const follows = (version) => state.joint?.version === version - 1 && state.joint.series === timeline.series && state.paths.kept;
+
+/** Take what was searched of a version, which is told after it. */
+function takeSearched({ version, components }) {
+  if (state.joint?.version !== version) return;
+  state.joint.components.forEach((component, k) => Object.assign(component, components[k]));
+  map.showFrontiers();
+  writeLegend();
+}
+
 function show(joint, paths) {
+  Object.assign(state, { joint, paths });
   nameRobots();
   map.show(joint, paths, timeline.isLatest);
   byId("no-paths").hidden = paths.kept;
@@ -212,7 +227,7 @@ async function begin() {
   writeLegend();
   await Promise.all([timeline.load(), learnOperator()]);
   timeline.follow(hash);
-  follow({ version: (event) => timeline.add(event), team: showTeam, story: ({ lines }) => addLines(lines), poses: ({ robots }) => map.setPoses(robots), contact: onContact });
+  follow({ version: (event) => timeline.add(event), searched: takeSearched, team: showTeam, story: ({ lines }) => addLines(lines), poses: ({ robots }) => map.setPoses(robots), contact: onContact });
 }
 
 begin();

@@ -6,7 +6,7 @@ import * as draw from "./draw.js";
 import { listen } from "./gestures.js";
 import { metres, robotOf } from "./format.js";
 import { onThemeChange } from "./palette.js";
-import { floorOf, linesOf, runsOf, sceneOf } from "./scene.js";
+import { floorOf, frontiersOf, linesOf, runsOf, sceneOf } from "./scene.js";
 import { compose } from "./se2.js";
 import { MOVE, Stage } from "./stage.js";
 
@@ -58,6 +58,12 @@ export class MapView {
     this.#places = paths.robots;
     if (this.#fits) this.fit(this.stage.isMoving);
     this.#follow();
+    this.refresh();
+  }
+
+  /** Show where the search goes on, which is known after the rest of a version. */
+  showFrontiers() {
+    for (const { scene } of this.stage.actors) Object.assign(scene, frontiersOf(scene.component));
     this.refresh();
   }
 

@@ -7,8 +7,9 @@ export const DOUBTFUL = 0.9; // a wall less sure than this is drawn as doubtful
 export function sceneOf(component, strong) {
   const segments = component.polylines.flat();
   const support = component.support.flat(), confidence = component.segment_confidence.flat();
-  const robots = new Map(Object.entries(component.robots));
+  const robots = new Map(Object.entries(component.robots)), floor = floorWithHull(component.free_space);
   const scene = {
+    component,
     robots,
     names: [...robots.keys()],
     confidence: component.confidence,
@@ -17,11 +18,10 @@ export function sceneOf(component, strong) {
     doubtful: confidence.filter((sure) => sure < DOUBTFUL).length,
     walls: Array.from({ length: LEVELS }, () => new Path2D()),
     doubts: new Path2D(),
-    floor: floorOf(component.free_space),
+    floor: floor.path,
     marks: component.marks ?? [],
-    frontiers: runsOf(component.frontiers ?? []),
-    hasFrontiers: (component.frontiers ?? []).length > 0,
-    points: pointsOf(segments, component.free_space, robots, component.marks ?? []),
+    ...frontiersOf(component),
+    points: pointsOf(segments, floor.points, robots, component.marks ?? []),
   };
   segments.forEach(([x1, y1, x2, y2], k) => {
     const strength = Math.min(1, Math.log(Math.max(1, support[k])) / Math.log(strong)) * confidence[k];
@@ -32,10 +32,23 @@ export function sceneOf(component, strong) {
   return scene;
 }
 
+/** Return where the search of a component goes on. */
+export function frontiersOf({ frontiers = [] }) {
+  return { frontiers: runsOf(frontiers), hasFrontiers: frontiers.length > 0 };
+}
+
 /** Return the support [scans] from which on a wall is drawn in full strength. */
 export function strongSupport(joint) {
   const all = joint.components.flatMap((component) => component.support.flat()).sort((a, b) => a - b);
   return Math.max(2, all[Math.floor(0.85 * (all.length - 1))] ?? 2);
+}
+
+const floors = new WeakMap();
+
+/** Return the floor and its extent; what was made of these very rings before is taken again. */
+function floorWithHull(rings) {
+  if (!floors.has(rings)) floors.set(rings, { path: floorOf(rings), points: hull(rings.flat()) });
+  return floors.get(rings);
 }
 
 /** Return all rings in one path; turned one way, so that where they overlap they do not cancel. */
@@ -73,15 +86,15 @@ export function runsOf(runs) {
   return path;
 }
 
-function pointsOf(segments, rings, robots, marks) {
+function pointsOf(segments, floor, robots, marks) {
   const ends = segments.flatMap(([x1, y1, x2, y2]) => [[x1, y1], [x2, y2]]);
-  const corners = [...rings.flat(), ...marks.map(({ position }) => position)];
-  const all = ends.length + corners.length ? [...ends, ...corners] : [...robots.values()];
-  return all.length > 4 ? hull(all) : all;
+  const all = [...hull(ends), ...floor, ...marks.map(({ position }) => position)];
+  return all.length > 0 ? hull(all) : [...robots.values()];
 }
 
 /** Return the corners of the convex hull: all that an extent, however turned, hangs on. */
 export function hull(points) {
+  if (points.length <= 4) return points;
   const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   return [...chain(sorted), ...chain(sorted.reverse())];
 }

@@ -25,8 +25,8 @@ export async function sendOrder(order) {
 
 /** Follow the events; the browser comes again by itself, with the last id it had.
  *
- * @param {object} on  `version`, `team`, `story` and `poses` take what an event says, `contact` true or
- *                     false: whether the server is heard.
+ * @param {object} on  `version`, `searched`, `team`, `story` and `poses` take what an event says,
+ *                     `contact` true or false: whether the server is heard.
  */
 export function follow(on) {
   let heard = Date.now();
@@ -36,7 +36,7 @@ export function follow(on) {
   };
   const open = () => {
     const source = new EventSource("/events");
-    for (const kind of ["version", "team", "story", "poses"]) {
+    for (const kind of ["version", "searched", "team", "story", "poses"]) {
       source.addEventListener(kind, (event) => {
         heard = Date.now();
         tell(true);

@@ -19,7 +19,7 @@ export class Timeline {
   #on;
   #timer = 0;
 
-  /** @param {object} on  `show` takes a version's number, `compare` one or null. */
+  /** @param {object} on  `show` takes a version's number and, if they were told, its changes, `compare` one or null. */
   constructor(on) {
     this.#on = on;
     byId("version").addEventListener("input", (event) => this.go(Number(event.target.value)));
@@ -39,11 +39,11 @@ export class Timeline {
   }
 
   /** Take a version that has just been made; one of another store begins a new history. */
-  async add({ version, created, series }) {
+  async add({ version, created, series, changes }) {
     if (series !== this.series || version !== this.latest + 1) await this.load();
     this.#times.set(version, created);
     this.latest = Math.max(this.latest, version);
-    if (this.isLatest || this.shown > version) this.#show(version);
+    if (this.isLatest || this.shown > version) this.#show(version, changes);
     this.#write();
   }
 
@@ -85,10 +85,10 @@ export class Timeline {
     }
   }
 
-  #show(version) {
+  #show(version, changes) {
     if (version === this.shown) return;
     this.shown = version;
-    this.#on.show(version);
+    this.#on.show(version, changes);
   }
 
   #compare(version) {
@@ -127,7 +127,12 @@ export class Timeline {
     slider.disabled = byId("play").disabled = latest < 2;
     byId("latest").setAttribute("aria-pressed", String(this.isLatest));
     this.#offer();
-    history.replaceState(null, "", this.hash || location.pathname);
+    this.#writeAddress();
+  }
+
+  #writeAddress() {
+    // It costs a word with the browser, which is dear while a version is to be shown.
+    if (location.hash !== this.hash) history.replaceState(null, "", this.hash || location.pathname);
   }
 
   #link() {
