@@ -21,6 +21,7 @@ from typing import Protocol, TypeAlias
 from mapweave.errors import UnknownSourceError
 from mapweave.io.readers.lines import split_lines
 from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.ros_bags.frames import StaticFrames
 from mapweave.io.readers.scan_lines import read_scan_lines
 from mapweave.io.readers.scans import count_scans, read_scans
 from mapweave.io.readers.streams import BLOCK
@@ -96,7 +97,7 @@ class Recording:
         """Return how many scans there are; reads it through."""
         return count_scans(self.path, self.options.angular_step, self.options.topic)
 
-    def scans(self) -> Iterator[Scan]:
+    def scans(self, on_laser: Callable[[str, StaticFrames], None] | None = None) -> Iterator[Scan]:
         """As `read_scans`."""
         return read_scans(
             self.path,
@@ -104,6 +105,7 @@ class Recording:
             angular_step=self.options.angular_step,
             topic=self.options.topic,
             on_warning=self.options.on_warning,
+            on_laser=on_laser,
         )
 
     def close(self) -> None:

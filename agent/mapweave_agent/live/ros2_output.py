@@ -2,9 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from mapweave.io.sources import ScanSource
+from mapweave.io.sources import Recording, ScanSource
 from mapweave_agent.agent import Tell
+
+if TYPE_CHECKING:  # an extra
+    from mapweave_ros.robot.frames import RobotFrames
 
 
 @contextmanager
@@ -22,7 +27,7 @@ def output_of(
     endpoints
         Where the router is unless `word` says it.
     source
-        Knows the robot's frames, if it is on a ROS 2 network.
+        Knows the robot's frames, if it is on a ROS 2 network or a bag.
 
     Raises
     ------
@@ -39,6 +44,17 @@ def output_of(
     from mapweave_ros.source import Ros2Source
 
     network = Ros2Network.parse(word, endpoints)
-    frames = source.frames if isinstance(source, Ros2Source) else None
+    frames = source.frames if isinstance(source, Ros2Source) else frames_of_recording(source)
     with Ros2Output.of_robot(network, robot, frames) as output:
         yield output.tell
+
+
+def frames_of_recording(source: ScanSource) -> "RobotFrames":
+    """Return the frames that a bag says the robot has; of another source nothing is known."""
+    from mapweave_ros.robot.frames import RobotFrames
+
+    frames = RobotFrames()
+    if isinstance(source, Recording):
+        quiet = replace(source.options, on_warning=lambda _: None)  # mapping it tells of it
+        next(replace(source, options=quiet).scans(frames.laser_in_bag), None)
+    return frames

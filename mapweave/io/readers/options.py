@@ -5,6 +5,8 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from mapweave.io.readers.ros_bags.frames import StaticFrames
+
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
@@ -23,6 +25,8 @@ class ReadOptions:
     odometry_topic
         Of a bag or a ROS 2 network: where odometry is said, such as ``/odom`` or ``/tf``; None
         takes the only one of a bag, where `odometry` asks for it.
+    on_laser
+        Of a bag: told before its first scan which frame the laser is in, and what is fixed to what.
     network
         Endpoints of the network that the reader is on, for sources that are on it as well.
     """
@@ -33,6 +37,7 @@ class ReadOptions:
     on_warning: Callable[[str], None] = warnings.warn
     network: tuple[str, ...] | None = None
     odometry_topic: str | None = None
+    on_laser: Callable[[str, StaticFrames], None] | None = None
 
 
 @dataclass(frozen=True, slots=True)

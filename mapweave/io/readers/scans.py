@@ -10,6 +10,7 @@ from mapweave.errors import FileError
 from mapweave.io.readers import log, scan_lines
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags import bag_folder, db3, mcap, ros1_bag
+from mapweave.io.readers.ros_bags.frames import StaticFrames
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
 from mapweave.scan.scan import Scan
 
@@ -40,6 +41,7 @@ def read_scans(
     angular_step: float | None = None,
     topic: str | None = None,
     on_warning: Callable[[str], None] = warnings.warn,
+    on_laser: Callable[[str, StaticFrames], None] | None = None,
 ) -> Iterator[Scan]:
     """Return the whole scans of a file, in its order, as they are read.
 
@@ -68,6 +70,8 @@ def read_scans(
     on_warning
         Called once, after the last scan, if something was left out, or assumed that the file does
         not say; by default a `UserWarning` says so.
+    on_laser
+        Of a bag: told before its first scan which frame the laser is in, and what is fixed to what.
 
     Raises
     ------
@@ -79,7 +83,9 @@ def read_scans(
     """
     source = Path(path)
     which = odometry if isinstance(odometry, str) else None
-    options = ReadOptions(bool(odometry), angular_step, topic, on_warning, odometry_topic=which)
+    options = ReadOptions(
+        bool(odometry), angular_step, topic, on_warning, odometry_topic=which, on_laser=on_laser
+    )
     if source.is_dir():
         return bag_folder.read(source, options)
     log.check_is_file(source)

@@ -84,6 +84,13 @@ class RobotFrames:
         with self._lock:
             self._laser = _Laser(frame_name(frame), mounting, known)
 
+    def laser_in_bag(self, frame: str, fixed: StaticFrames) -> None:
+        """Take where poses are taken from of a bag, which turns its scans by what it holds."""
+        mounting = fixed.mounting(frame)
+        with self._lock:
+            self._static = fixed
+        self.laser_sits(frame, mounting or Mounting(), known=mounting is not None)
+
     def of_robot(self, default: str) -> str:
         """Return the frame that is where the robot is."""
         with self._lock:

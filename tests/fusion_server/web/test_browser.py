@@ -481,20 +481,16 @@ def test_keys_move_zoom_and_turn_the_map_and_fit_it_again(
 ) -> None:
     page.publish(make_joint(1, lines, a=0.0))
     expect_version(seen.tab, 1)
-    seen.tab.wait_for_timeout(200)
-    fitted = picture(seen.tab)
+    fitted = until_still(seen.tab)
     seen.tab.locator("#map").focus()
-    seen.tab.wait_for_timeout(200)
-    focused = picture(seen.tab)
+    focused = until_still(seen.tab)
     for key in ("ArrowLeft", "+", "[", "-"):
         before = picture(seen.tab)
         seen.tab.keyboard.press(key)
-        seen.tab.wait_for_timeout(150)
-        assert picture(seen.tab) != before, key
+        until_other(seen.tab, before)
     for key in ("0", "f"):
         seen.tab.keyboard.press(key)
-    seen.tab.wait_for_timeout(200)
-    assert picture(seen.tab) == focused or picture(seen.tab) == fitted
+    assert until_still(seen.tab) in (focused, fitted)
 
 
 @pytest.mark.parametrize("dark", [False, True])

@@ -2,7 +2,7 @@
 
 import { move } from "./se2.js";
 import { colourOf, theme } from "./palette.js";
-import { percent, robotOf } from "./format.js";
+import { counted, percent, robotsOf } from "./format.js";
 import { boxOf } from "./layout.js";
 import { LEVELS } from "./scene.js";
 
@@ -215,11 +215,12 @@ export function drawCaption(context, camera, { scene, pose }, number, count) {
 
 /** Return what is written above a component, the longest first: beside others it gets no wider than it. */
 function captionsOf(scene, number, count) {
-  const robots = [...new Set(scene.names.map(robotOf))].join(" + ");
-  const title = count > 1 ? `Component ${number} of ${count}: ${robots}` : robots;
+  const all = robotsOf(scene.names), robots = all.join(" + ");
+  const which = `Component ${number} of ${count}`, title = count > 1 ? `${which}: ${robots}` : robots;
   if (scene.names.length === 1) return [`${title}  ·  not joined to another robot`, `${title}  ·  not joined`, title, robots];
   const sure = `${percent(scene.confidence)} sure`;
-  return [`${title}  ·  ${sure}`, `${robots}  ·  ${sure}`, robots, `${scene.names.length} robots`];
+  const many = counted(all.length, "robot");
+  return [`${title}  ·  ${sure}`, `${which}: ${many}  ·  ${sure}`, `${many}  ·  ${sure}`, many];
 }
 
 function write(context, u, v, text, align = "left") {

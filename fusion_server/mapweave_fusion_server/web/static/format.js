@@ -30,5 +30,11 @@ export const metres = (length) => `${length < 10 ? length.toFixed(2) : length.to
 /** Return an angle [rad] in degrees. */
 export const degrees = (angle) => `${Math.round((180 * angle) / Math.PI)}°`;
 
+/** Return the robots of components, each once, r2 before r10. */
+export const robotsOf = (names) => [...new Set(names.map(robotOf))].sort(byName);
+
+/** Order robots' names: numbers in them count as such. */
+export const byName = (a, b) => a.localeCompare(b, "en", { numeric: true });
+
 /** Return the robot in a component's name, such as `a` in `a/0`. */
 export const robotOf = (component) => component.slice(0, component.lastIndexOf("/"));

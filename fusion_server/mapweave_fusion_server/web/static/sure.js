@@ -2,7 +2,7 @@
 
 import { chipOf, endsOf, isReliedOn } from "./decisions.js";
 import { element, refill } from "./dom.js";
-import { counted, percent, robotOf } from "./format.js";
+import { counted, percent, robotsOf } from "./format.js";
 import { DOUBTFUL } from "./scene.js";
 
 /** Fill `target` for the version `joint`; `show` takes the decision to be explained. */
@@ -15,7 +15,7 @@ export function fillSure(target, joint, scenes, show) {
 /** Return who is not joined to whom, with the best that was found between them. */
 function notJoined(joint, scenes, show) {
   if (scenes.length < 2) return null;
-  const groups = scenes.map((scene) => [...new Set(scene.names.map(robotOf))].join(" + "));
+  const groups = scenes.map((scene) => robotsOf(scene.names).join(" + "));
   const whose = (name) => scenes.findIndex((scene) => scene.robots.has(name));
   const between = joint.alignments
     .map((alignment, index) => ({ alignment, index }))

@@ -1,7 +1,7 @@
 // The team in a table, and how the coordinator is.
 
 import { element, refill, write } from "./dom.js";
-import { amount, counted, duration } from "./format.js";
+import { amount, byName, counted, duration } from "./format.js";
 import { colourOf } from "./palette.js";
 
 /** Fill `target` with a row a robot; `on.follow` takes the robot to be followed, or null. */
@@ -9,8 +9,9 @@ export function fillTeam(target, report, following, on) {
   const now = report.coordinator.stamp;
   const head = element("tr", {}, ...["Robot", "State", "Scans", "Sent", "Heard"].map((title, k) =>
     element("th", { scope: "col", class: k > 1 ? "number" : "" }, title)));
-  const rows = report.robots.map((robot) => rowOf(robot, now, following === robot.robot, on));
-  const names = report.robots.map(({ robot }) => robot).join(" ");
+  const robots = [...report.robots].sort((a, b) => byName(a.robot, b.robot));
+  const rows = robots.map((robot) => rowOf(robot, now, following === robot.robot, on));
+  const names = robots.map(({ robot }) => robot).join(" ");
   if (target.dataset.robots !== names) {
     target.dataset.robots = names;
     target.replaceChildren(rows.length

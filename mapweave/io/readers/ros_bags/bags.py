@@ -213,6 +213,8 @@ def read_open_bag(path: Path, bag: Bag, options: ReadOptions) -> Iterator[Scan]:
                 tally.add_damaged(tally.pieces, error)
                 continue
             scan = beside.completed(frame, measured)
+            if options.on_laser is not None and not tally.scans:
+                options.on_laser(frame, beside.frames)
             tally.add_scan(scan)
             yield scan
         if problem := tally.problem():
