@@ -131,7 +131,7 @@ def _coarse_one_way(
     stride = 1 + (len(other.weight) - 1) // max_samples
     weight = other.weight[::stride] * (other.weight.sum() / other.weight[::stride].sum())
     points = other.oriented.points[::stride] / reference.cell
-    facing = _directions(other.oriented.normals[::stride])
+    facing = _directions(other.facing[::stride])
     samples = np.column_stack([points, facing]).astype(np.float32)
     angle = transforms[:, 2].astype(np.float32)
     shift = (transforms[:, :2] - reference.origin) / reference.cell
@@ -146,10 +146,9 @@ def _coarse_one_way(
     return scores
 
 
-def _directions(normals: FloatArray) -> FloatArray:
-    """(n,) directions of unit vectors, in [0, DIRECTIONS), shifted so that sums stay positive."""
-    turns = np.arctan2(normals[:, 1], normals[:, 0]) / (2 * np.pi)
-    return np.asarray((turns % 1.0 + 4) * DIRECTIONS)
+def _directions(facing: FloatArray) -> FloatArray:
+    """(n,) directions in [0, DIRECTIONS) of turns, shifted so that sums stay positive."""
+    return np.asarray((facing + 4) * DIRECTIONS)
 
 
 def _codes(raster: DistanceField, p: VerificationParameters) -> Codes:
@@ -169,9 +168,7 @@ def said_by_cells(raster: DistanceField, closeness: float, clearance: float) -> 
 
     SEEN_THROUGH where space is free by more than `clearance` [m], else NOTHING.
     """
-    facing = (_directions(raster.oriented.normals).astype(np.int32) & (DIRECTIONS - 1)).astype(
-        np.uint8
-    )
+    facing = (_directions(raster.facing).astype(np.int32) & (DIRECTIONS - 1)).astype(np.uint8)
     said = closeness, clearance, NOTHING, SEEN_THROUGH
     return cell_codes(raster.nearest, raster.distance, raster.depth, facing, *said)
 

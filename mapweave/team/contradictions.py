@@ -24,6 +24,7 @@ from mapweave.matching.verification import (
     verify,
 )
 from mapweave.parameters import StageParameters, derived
+from mapweave.team.consistency import bits
 from mapweave.team.cycles import Edge, poses_along
 from mapweave.team.min_cut import groups
 from mapweave.team.recent import Recent
@@ -196,19 +197,24 @@ class MapContradictions:
             poses, paths = poses_along(group[0], self._count, self._edges, present)
             pairs = list(combinations(group, 2))
             first, second = np.array(pairs).T
+            places = {k: self._places(k, poses) for k in present if self._edges[k].first in group}
+            back = {j: se2.inverse(poses[j]) for j in group}
             held = [
-                se2.transform_points(se2.inverse(poses[j]), self._held(paths[i] ^ paths[j], poses))
+                se2.transform_points(back[j], self._held(paths[i] ^ paths[j], places))
                 for i, j in pairs
             ]
             found += self._witnesses.ask(pairs, se2.between(poses[first], poses[second]), held)
         return found
 
-    def _held(self, way: int, poses: FloatArray) -> FloatArray:
+    def _places(self, k: int, poses: FloatArray) -> FloatArray:
+        """(n, 2) places that hold edge `k`, in the frame of the (m, 3) poses."""
+        edge = self._edges[k]
+        return se2.transform_points(poses[edge.first], edge.places)
+
+    def _held(self, way: int, places: Mapping[int, FloatArray]) -> FloatArray:
         """(k, 2) places that hold a way of edges, a bit mask; none where an edge tells of none."""
-        edges = [edge for k, edge in enumerate(self._edges) if way >> k & 1]
-        if not all(len(edge.places) for edge in edges):
-            return np.empty((0, 2))
-        return np.concatenate([se2.transform_points(poses[e.first], e.places) for e in edges])
+        found = [places[k] for k in bits(way)]
+        return np.concatenate(found) if all(map(len, found)) else np.empty((0, 2))
 
 
 def _reach(raster: DistanceField, frame: FloatArray) -> float:
