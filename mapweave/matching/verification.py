@@ -7,6 +7,7 @@ wall of one map where the other saw through is a contradiction.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -59,6 +60,13 @@ class VerificationParameters(StageParameters):
     shared_part: float = Field(
         0.5, gt=0, le=1, description="share of a segment that coincides, to count as shared"
     )
+
+
+class Tally(NamedTuple):
+    """[m] of wall in both maps, the smaller of the two, and of wall that the other saw through."""
+
+    common: float
+    contradicted: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,10 +201,8 @@ def verify(
     parameters: VerificationParameters,
 ) -> Verdict:
     """Return what both maps say of `transform` (3,) from `other` to `reference`."""
-    forward = _one_way(reference, other, transform, parameters)
-    backward = _one_way(other, reference, se2.inverse(transform), parameters)
-    contradicted = forward.contradicted + backward.contradicted
-    common = min(forward.common, backward.common)
+    forward, backward = _both_ways(reference, other, transform, parameters)
+    common, contradicted = _tallied(forward, backward)
     return Verdict(
         common,
         contradicted,
@@ -205,6 +211,16 @@ def verify(
         _held(other, forward.coincides),
         parameters.contradiction_weight,
     )
+
+
+def tally(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    parameters: VerificationParameters,
+) -> Tally:
+    """Return the wall in common and contradicted, as `verify` does, and nothing else: sooner."""
+    return _tallied(*_both_ways(reference, other, transform, parameters))
 
 
 def shared_complexity(
@@ -246,6 +262,24 @@ def contradicting(
 ) -> BoolArray:
     """Tell which samples (n,) of the walls of `other` lie where `reference` saw free space."""
     return _one_way(reference, other, transform, parameters).contradicts
+
+
+def _both_ways(
+    reference: DistanceField,
+    other: DistanceField,
+    transform: FloatArray,
+    parameters: VerificationParameters,
+) -> tuple[_OneWay, _OneWay]:
+    """Look the samples of each map up in the other."""
+    forward = _one_way(reference, other, transform, parameters)
+    backward = _one_way(other, reference, se2.inverse(transform), parameters)
+    return forward, backward
+
+
+def _tallied(forward: _OneWay, backward: _OneWay) -> Tally:
+    contradicted = forward.contradicted + backward.contradicted
+    common = min(forward.common, backward.common)
+    return Tally(common, contradicted)
 
 
 def _one_way(

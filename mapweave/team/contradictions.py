@@ -5,7 +5,7 @@ saw through speak against one of the alignments between them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from math import inf
 from typing import TypeAlias
@@ -19,9 +19,9 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, Int32Array
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import (
-    Verdict,
+    Tally,
     VerificationParameters,
-    verify,
+    tally,
 )
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.consistency import bits
@@ -57,9 +57,7 @@ class ContradictionParameters(StageParameters):
 
 
 # By both rasters, the transform in thousandths of the steps, and the places that hold them.
-KnownVerdicts: TypeAlias = Recent[
-    tuple[DistanceField, DistanceField, int, int, int, bytes], Verdict
-]
+KnownVerdicts: TypeAlias = Recent[tuple[DistanceField, DistanceField, int, int, int, bytes], Tally]
 PARTS = 1000  # of a step, to which a transform is rounded when it is judged
 
 
@@ -71,7 +69,7 @@ class PairVerdict:
     ----------
     first, second
         Their numbers.
-    verdict
+    tally
         What they say of how they are placed.
     doubt
         The log of the odds against that.
@@ -79,7 +77,7 @@ class PairVerdict:
 
     first: int
     second: int
-    verdict: Verdict
+    tally: Tally
     doubt: float
 
 
@@ -148,28 +146,27 @@ class PairVerdicts:
         one, other = self._rasters[first], self._rasters[second]
         x, y, turn = at
 
-        def judge() -> Verdict:
+        def judge() -> Tally:
             rounded = np.array(at) * np.array([p.step, p.step, p.turn_step]) / PARTS
             there = se2.compose(rounded, se2.inverse(self._frames[second]))
             pose = se2.compose(self._frames[first], there)
-            found = verify(one, other, pose, p.verification)
+            found = tally(one, other, pose, p.verification)
             if len(around) == 0 or self._excess(found) <= 0:
                 return found
             held = se2.transform_points(self._frames[second], around * p.step)
             about = one, other, pose, held, p.verification, p.bends, p.within
-            common, contradicted = judged_around(*about)
-            return replace(found, common=common, contradicted=contradicted)
+            return Tally(*judged_around(*about))
 
-        verdict = self._verdicts.get((one, other, x, y, turn, around.tobytes()), judge)
-        excess = self._excess(verdict)
+        told = self._verdicts.get((one, other, x, y, turn, around.tobytes()), judge)
+        excess = self._excess(told)
         if excess <= 0:
             return None
-        return PairVerdict(first, second, verdict, excess / p.metres_per_log)
+        return PairVerdict(first, second, told, excess / p.metres_per_log)
 
-    def _excess(self, verdict: Verdict) -> float:
+    def _excess(self, told: Tally) -> float:
         """[m] contradicted beyond what is to be expected."""
-        both = max(verdict.common, 0.0) + verdict.contradicted
-        return verdict.contradicted - self._p.allowance * both
+        both = max(told.common, 0.0) + told.contradicted
+        return told.contradicted - self._p.allowance * both
 
 
 class MapContradictions:

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mapweave.maps import JointComponent, JointMap
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.wire.alignment_message import WireAlignment
+from mapweave_protocol.wire.alignment_message import AlignmentPacker, WireAlignment
 from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.coding.line_code import CERTAINTIES
@@ -160,13 +160,19 @@ class JointMapMessage(Message):
     )
 
     @classmethod
-    def pack(cls, joint: JointMap, series: str) -> Self:
-        """Return `joint` as the message of a version of `series`."""
+    def pack(cls, joint: JointMap, series: str, packer: AlignmentPacker | None = None) -> Self:
+        """Return `joint` as the message of a version of `series`.
+
+        Parameters
+        ----------
+        packer
+            Packed the alignments of the version before; None packs all.
+        """
         return cls(
             series=series,
             version=joint.version,
             components=tuple(WireComponent.pack(component) for component in joint.components),
-            alignments=tuple(WireAlignment.pack(alignment) for alignment in joint.alignments),
+            alignments=(packer or AlignmentPacker()).pack(joint.alignments),
             orders=tuple(WireOrder.pack(order) for order in joint.orders),
         )
 
