@@ -194,6 +194,12 @@ class WireAlignment(WireModel):
         """Return the values of the fields, in their order, as they travel."""
         return self.travelling
 
+    def model_copy(self, *, update: Mapping[str, object] | None = None, deep: bool = False) -> Self:
+        """Return a copy, with other values of some fields; of its own how these travel."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__.pop("travelling", None)
+        return copied
+
     def unpack(self) -> Alignment:
         """Return the alignment."""
         return Alignment(
