@@ -125,11 +125,12 @@ class LineMap:
 
     def moved(self, pose: FloatArray) -> "LineMap":
         """Return this map, given in the frame at `pose` (3,), in that frame's parent."""
+        turned, shift = se2.rotation(pose[2]).T, pose[:2]  # once, for all the rings
         return LineMap(
             se2.transform_segments(pose, self.segments),
             self.polyline,
             self.support,
-            tuple(se2.transform_points(pose, ring) for ring in self.free_space),
+            tuple([ring @ turned + shift for ring in self.free_space]),
         )
 
     @property

@@ -11,6 +11,7 @@ from mapweave.team.joining import JointParameters
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.joint_optimization import JointOptimizationParameters
 from mapweave_fusion_server.draft import Draft
+from mapweave_protocol.wire.alignment_message import AlignmentPacker
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import JointMapMessage
 
@@ -62,6 +63,7 @@ class VersionBuilder:
         self._builder = JointMapBuilder(
             JointParameters.of(config), JointOptimizationParameters.of(config)
         )
+        self._packer = AlignmentPacker()
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
         self._future: Future[Built] | None = None
 
@@ -113,5 +115,5 @@ class VersionBuilder:
         return self._packed(draft, begun, draft.build(self._builder))
 
     def _packed(self, draft: Draft, begun: float, joint: JointMap) -> Built:
-        message = JointMapMessage.pack(joint, self.series)
+        message = JointMapMessage.pack(joint, self.series, self._packer)
         return Built(draft, begun, joint, message, encode(message))

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapweave.errors import FileError
-from mapweave.io.map_files import load, read_map
 from mapweave.mapping.localization.known_map import KnownMap
 from mapweave.maps import RobotMap
 
@@ -41,10 +40,12 @@ class Start:
         FileError
             If a file is no such map, or one without walls.
         """
+        if options.continued is None and options.localize is None:
+            return cls()
+        from mapweave.io.map_files import load, read_map  # loads what files are checked by
+
         if options.continued is not None:
             return cls(known=_with_walls(options.continued, read_map(options.continued)))
-        if options.localize is None:
-            return cls()
         place = KnownMap.of(load(options.localize))
         if not any(len(lines.segments) for lines in place.components.values()):
             raise _no_walls(options.localize)

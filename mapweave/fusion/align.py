@@ -219,8 +219,7 @@ def _told_coarsely(
     Refused where no place counts as much, coarsely, as must be in common; accepted where the best
     convinces when it is judged finely, its rivals among the other shifts.
     """
-    maps = (first.lines, first.coarse), (second.lines, second.coarse)
-    places = coarse_places(*maps, p.hypotheses.coarse, p.verification)
+    places = coarse_places(first.coarse, second.coarse, p.hypotheses.coarse, p.verification)
     if len(places.scores) == 0:
         return None
     fields = first.coarse.field, second.coarse.field

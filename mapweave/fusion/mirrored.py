@@ -38,7 +38,7 @@ def mirrored(lines: LineMap) -> LineMap:
 
 def may_be_mirrored(ours: PreparedMap, theirs: PreparedMap, p: FusionParameters) -> bool:
     """Whether so much may be in common of two maps, one of them mirrored, as must be to tell."""
-    maps = (ours.lines, ours.coarse), (theirs.lines, theirs.coarse)
+    maps = ours.coarse, theirs.coarse, theirs.lines.segments
     most = most_if_mirrored(*maps, p.hypotheses.coarse, p.verification)
     return most >= p.mirrored_part * p.mirrored_wall
 

@@ -1,5 +1,7 @@
 """The numbers of map fusion: one model for each stage."""
 
+from functools import cache
+
 from pydantic import Field
 
 from mapweave.config import Config
@@ -64,6 +66,13 @@ def chosen(parameters: FusionParameters | None, config: Config | None) -> Fusion
     if parameters is not None:
         check_kind("parameters", parameters, FusionParameters)
         return parameters
-    config = Config() if config is None else config
+    if config is None:
+        return _usual()
     check_kind("config", config, Config)
     return FusionParameters.of(config)
+
+
+@cache
+def _usual() -> FusionParameters:
+    """Return those of the default configuration: making them takes a good part of a refusal."""
+    return FusionParameters.of(Config())

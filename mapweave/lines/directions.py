@@ -4,17 +4,20 @@ A wall counts for the direction of its line, modulo pi, so that its two faces ad
 histogram modulo 2 pi keeps the visible sides apart and serves rotation hypotheses.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arguments import as_segments, as_values
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import ComplexArray, FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.kernels.lines import main_directions as kernel
 from mapweave.kernels.lines.main_directions import LINE_PERIOD, DirectionRules, line_difference
 
 DIRECTED_PERIOD = 2 * np.pi
+TURN_BINS = 360  # in which turns are looked for: 1° each
 
 __all__ = [
     "DIRECTED_PERIOD",
@@ -25,6 +28,7 @@ __all__ = [
     "line_difference",
     "main_directions",
     "nearest_direction",
+    "turn_spectrum",
 ]
 
 
@@ -132,18 +136,26 @@ def main_directions(
     )
 
 
+def turn_spectrum(segments: FloatArray) -> ComplexArray:
+    """Return the spectrum (181,) of the histogram of the directions of (n, 4) `segments` [m].
+
+    Directed, so that half a turn is not the same. Of a map compared with many it is made once.
+    """
+    histogram = direction_histogram(segments, bins=TURN_BINS, period=DIRECTED_PERIOD)
+    return np.asarray(np.fft.rfft(histogram))
+
+
 def likely_turns(
-    reference: FloatArray, other: FloatArray, count: int, separation: float, least: float = 0.0
+    reference: ComplexArray, other: ComplexArray, count: int, separation: float, least: float = 0.0
 ) -> FloatArray:
     """Return the turns that make the walls of `other` parallel to those of `reference`.
 
-    Directed segments, so that half a turn is not the same: peaks of the circular correlation of
-    the two histograms.
+    Peaks of the circular correlation of the histograms of their directions.
 
     Parameters
     ----------
     reference, other
-        (n, 4) and (m, 4) x1 y1 x2 y2 [m].
+        As of `turn_spectrum`.
     count
         How many turns at most.
     separation
@@ -156,21 +168,20 @@ def likely_turns(
     FloatArray
         (k,) [rad] in [-pi, pi), the likeliest first.
     """
-    bins = 360
-    ours, theirs = (
-        np.fft.rfft(direction_histogram(segments, bins=bins, period=DIRECTED_PERIOD))
-        for segments in (reference, other)
-    )
-    likely = np.fft.irfft(ours * theirs.conj(), bins)
-    peaks = np.flatnonzero((likely >= np.roll(likely, 1)) & (likely > np.roll(likely, -1)))
+    likely = np.fft.irfft(reference * other.conj(), TURN_BINS)
+    around = np.concatenate([likely[-1:], likely, likely[:1]])
+    peaks = np.flatnonzero((likely >= around[:-2]) & (likely > around[2:]))
     if least > 0:
         peaks = peaks[likely[peaks] >= least * likely.max()]
     kept: list[float] = []
-    for peak in peaks[np.argsort(-likely[peaks], kind="stable")]:
-        turn = float(np.mod(peak * DIRECTED_PERIOD / bins + np.pi, DIRECTED_PERIOD) - np.pi)
-        if all(np.cos(turn - other_turn) < np.cos(separation) for other_turn in kept):
+    apart = math.cos(separation)
+    for peak in peaks[np.argsort(-likely[peaks], kind="stable")].tolist():
+        if len(kept) == count:
+            break
+        turn = (peak * DIRECTED_PERIOD / TURN_BINS + math.pi) % DIRECTED_PERIOD - math.pi
+        if all(math.cos(turn - other_turn) < apart for other_turn in kept):
             kept.append(turn)
-    return np.array(kept[:count])
+    return np.array(kept)
 
 
 def nearest_direction(angle: ArrayLike, directions: FloatArray, tolerance: float) -> FloatArray:

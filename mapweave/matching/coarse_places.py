@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import ComplexArray, FloatArray
 from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view
 from mapweave.kernels.matching.shifts import best_shifts
-from mapweave.lines.directions import likely_turns
+from mapweave.lines.directions import likely_turns, turn_spectrum
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.field_icp import FieldIcpParameters, align_on_raster
@@ -83,12 +83,15 @@ class CoarseMap:
         (n, 4) of its walls: x, y [m], where the normal points, in [0, 1) turns, and metres.
     view
         What cells say and samples, together.
+    directions
+        (181,) of its walls, as of `directions.turn_spectrum`.
     """
 
     field: DistanceField
     codes: Codes
     samples: FloatArray
     view: PlaceView
+    directions: ComplexArray
 
     @classmethod
     def of(
@@ -99,13 +102,12 @@ class CoarseMap:
         What may have been moved is looked for by a part of its metres.
         """
         field = DistanceField.of(lines, p.raster)
-        normals = field.oriented.normals
-        turns = np.arctan2(normals[:, 1], normals[:, 0]) / (2 * np.pi) % 1.0
         moved = worth_of_missing(field, verification) < 1
         metres = np.where(moved, p.moved_part, 1.0) * field.weight
-        samples = np.column_stack([field.oriented.points, turns, metres])
+        samples = np.column_stack([field.oriented.points, field.facing, metres])
         codes = said_by_cells(field, p.closeness, p.clearance)
-        return cls(field, codes, samples, place_view(codes, field.origin, field.cell, samples))
+        view = place_view(codes, field.origin, field.cell, samples)
+        return cls(field, codes, samples, view, turn_spectrum(lines.segments))
 
     def mirrored(self) -> PlaceView:
         """Return the same view as a sensor would have it that hangs upside down: y is -y."""
@@ -136,14 +138,14 @@ class CoarsePlaces(NamedTuple):
 
 
 def coarse_places(
-    reference: tuple[LineMap, CoarseMap],
-    other: tuple[LineMap, CoarseMap],
+    here: CoarseMap,
+    there: CoarseMap,
     parameters: CoarsePlaceParameters,
     verification: VerificationParameters,
 ) -> CoarsePlaces:
-    """Look where `other` may lie in `reference`."""
-    p, (ours, here), (theirs, there) = parameters, reference, other
-    views, turns = (here.view, there.view), _turns(ours.segments, theirs.segments, p)
+    """Look where the map `there` may lie in the one that is `here`."""
+    p = parameters
+    views, turns = (here.view, there.view), _turns(here.directions, there.directions, p)
     shifted, rough = _shifts(views, turns, p.shifts, p, verification)
     best = np.argsort(-rough, kind="stable")[: p.aligned]
     aligned = align_on_raster(here.field, there.field, shifted[best], p.alignment)
@@ -152,21 +154,28 @@ def coarse_places(
 
 
 def most_if_mirrored(
-    reference: tuple[LineMap, CoarseMap],
-    other: tuple[LineMap, CoarseMap],
+    here: CoarseMap,
+    there: CoarseMap,
+    segments: FloatArray,
     parameters: CoarsePlaceParameters,
     verification: VerificationParameters,
 ) -> float:
-    """Return the most that any shift of `other`, mirrored, counts in wide cells [m]."""
-    p, (ours, here), (theirs, there) = parameters, reference, other
+    """Return the most that any shift of a map, mirrored, counts in wide cells [m].
+
+    Parameters
+    ----------
+    segments
+        (n, 4) of the map `there`, which is mirrored [m].
+    """
+    p = parameters
     # What is on the left of a wall is on its right then: it runs the other way.
-    turned = theirs.segments[:, [2, 3, 0, 1]] * np.array([1.0, -1.0, 1.0, -1.0])
-    views, turns = (here.view, there.mirrored()), _turns(ours.segments, turned, p)
+    turned = turn_spectrum(segments[:, [2, 3, 0, 1]] * np.array([1.0, -1.0, 1.0, -1.0]))
+    views, turns = (here.view, there.mirrored()), _turns(here.directions, turned, p)
     return float(_shifts(views, turns, 1, p, verification)[1].max(initial=0.0))
 
 
-def _turns(ours: FloatArray, theirs: FloatArray, p: CoarsePlaceParameters) -> FloatArray:
-    """(k,) [rad] at which much of two maps' wall is parallel, of (n, 4) and (m, 4) segments."""
+def _turns(ours: ComplexArray, theirs: ComplexArray, p: CoarsePlaceParameters) -> FloatArray:
+    """(k,) [rad] at which much of two maps' wall is parallel, of the spectra of its directions."""
     return likely_turns(ours, theirs, p.turns, p.turn_separation, p.least_parallel)
 
 

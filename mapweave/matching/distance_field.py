@@ -110,6 +110,12 @@ class DistanceField:
         """(n,) how deep each sample lies in the free space of its own map [m]."""
         return self.look_up(self.oriented.points)[2]
 
+    @cached_property
+    def facing(self) -> FloatArray:
+        """(n,) where the normal of each sample points, in [0, 1) turns."""
+        normals = self.oriented.normals
+        return np.asarray(np.arctan2(normals[:, 1], normals[:, 0]) / (2 * np.pi) % 1.0)
+
     def look_up(self, points: FloatArray) -> tuple[Int32Array, Float32Array, Float32Array]:
         """Return nearest sample, distance and free depth at (..., 2) `points` [m], map frame.
 

@@ -5,6 +5,8 @@ wall nearest to its cell, whichever way that faces, and pulls only where both fa
 What survives is aligned once more, by `icp.align_all`.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -47,12 +49,18 @@ def align_on_raster(
     moving = OrientedPoints(moving.points - middle, moving.normals, moving.polyline)
     moved = kernel.align_on_raster(
         *(moving.points, np.ascontiguousarray(moving.normals), _about(transforms, middle)),
-        np.geomspace(p.start_scale, p.end_scale, p.iterations),
+        _scales(p),
         *(reference.oriented.points, reference.oriented.normals, reference.nearest),
         reference.origin,
         *(reference.cell, p.min_cosine, p.damping * len(moving)),
     )
     return _about(moved, -middle)
+
+
+@lru_cache(16)
+def _scales(p: FieldIcpParameters) -> FloatArray:
+    """(iterations,) [m] residuals at which a pair's weight is a quarter."""
+    return np.geomspace(p.start_scale, p.end_scale, p.iterations)
 
 
 def _about(transforms: FloatArray, middle: FloatArray) -> FloatArray:

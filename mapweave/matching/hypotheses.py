@@ -141,9 +141,8 @@ def propose_by_walls(
     These are of walls in cells: about what `verify` makes of them, once aligned.
     """
     p = parameters
-    turns = likely_turns(
-        reference.lines.segments, other.lines.segments, p.correlation.turns, p.turn_separation
-    )
+    directions = reference.coarse.directions, other.coarse.directions
+    turns = likely_turns(*directions, p.correlation.turns, p.turn_separation)
     marks = [
         Marks.of(shape.raster, verification.closeness, p.correlation.clearance)
         for shape in (reference, other)

@@ -196,7 +196,7 @@ class _Graph:
     def _testimony(
         self, kind: ReasonKind, witness: PairVerdict, found: Reason
     ) -> tuple[Reason, tuple[Pair, ...]]:
-        v = witness.verdict
+        v = witness.tally
         cause = Reason(kind, {"common": v.common, "contradicted": v.contradicted}, found)
         return cause, ((self._names[witness.first], self._names[witness.second]),)
 

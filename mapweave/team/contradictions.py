@@ -5,7 +5,7 @@ saw through speak against one of the alignments between them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from math import inf
 from typing import TypeAlias
@@ -19,11 +19,12 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, Int32Array
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import (
-    Verdict,
+    Tally,
     VerificationParameters,
-    verify,
+    tally,
 )
 from mapweave.parameters import StageParameters, derived
+from mapweave.team.consistency import bits
 from mapweave.team.cycles import Edge, poses_along
 from mapweave.team.min_cut import groups
 from mapweave.team.recent import Recent
@@ -56,9 +57,7 @@ class ContradictionParameters(StageParameters):
 
 
 # By both rasters, the transform in thousandths of the steps, and the places that hold them.
-KnownVerdicts: TypeAlias = Recent[
-    tuple[DistanceField, DistanceField, int, int, int, bytes], Verdict
-]
+KnownVerdicts: TypeAlias = Recent[tuple[DistanceField, DistanceField, int, int, int, bytes], Tally]
 PARTS = 1000  # of a step, to which a transform is rounded when it is judged
 
 
@@ -70,7 +69,7 @@ class PairVerdict:
     ----------
     first, second
         Their numbers.
-    verdict
+    tally
         What they say of how they are placed.
     doubt
         The log of the odds against that.
@@ -78,7 +77,7 @@ class PairVerdict:
 
     first: int
     second: int
-    verdict: Verdict
+    tally: Tally
     doubt: float
 
 
@@ -147,28 +146,27 @@ class PairVerdicts:
         one, other = self._rasters[first], self._rasters[second]
         x, y, turn = at
 
-        def judge() -> Verdict:
+        def judge() -> Tally:
             rounded = np.array(at) * np.array([p.step, p.step, p.turn_step]) / PARTS
             there = se2.compose(rounded, se2.inverse(self._frames[second]))
             pose = se2.compose(self._frames[first], there)
-            found = verify(one, other, pose, p.verification)
+            found = tally(one, other, pose, p.verification)
             if len(around) == 0 or self._excess(found) <= 0:
                 return found
             held = se2.transform_points(self._frames[second], around * p.step)
             about = one, other, pose, held, p.verification, p.bends, p.within
-            common, contradicted = judged_around(*about)
-            return replace(found, common=common, contradicted=contradicted)
+            return Tally(*judged_around(*about))
 
-        verdict = self._verdicts.get((one, other, x, y, turn, around.tobytes()), judge)
-        excess = self._excess(verdict)
+        told = self._verdicts.get((one, other, x, y, turn, around.tobytes()), judge)
+        excess = self._excess(told)
         if excess <= 0:
             return None
-        return PairVerdict(first, second, verdict, excess / p.metres_per_log)
+        return PairVerdict(first, second, told, excess / p.metres_per_log)
 
-    def _excess(self, verdict: Verdict) -> float:
+    def _excess(self, told: Tally) -> float:
         """[m] contradicted beyond what is to be expected."""
-        both = max(verdict.common, 0.0) + verdict.contradicted
-        return verdict.contradicted - self._p.allowance * both
+        both = max(told.common, 0.0) + told.contradicted
+        return told.contradicted - self._p.allowance * both
 
 
 class MapContradictions:
@@ -196,19 +194,24 @@ class MapContradictions:
             poses, paths = poses_along(group[0], self._count, self._edges, present)
             pairs = list(combinations(group, 2))
             first, second = np.array(pairs).T
+            places = {k: self._places(k, poses) for k in present if self._edges[k].first in group}
+            back = {j: se2.inverse(poses[j]) for j in group}
             held = [
-                se2.transform_points(se2.inverse(poses[j]), self._held(paths[i] ^ paths[j], poses))
+                se2.transform_points(back[j], self._held(paths[i] ^ paths[j], places))
                 for i, j in pairs
             ]
             found += self._witnesses.ask(pairs, se2.between(poses[first], poses[second]), held)
         return found
 
-    def _held(self, way: int, poses: FloatArray) -> FloatArray:
+    def _places(self, k: int, poses: FloatArray) -> FloatArray:
+        """(n, 2) places that hold edge `k`, in the frame of the (m, 3) poses."""
+        edge = self._edges[k]
+        return se2.transform_points(poses[edge.first], edge.places)
+
+    def _held(self, way: int, places: Mapping[int, FloatArray]) -> FloatArray:
         """(k, 2) places that hold a way of edges, a bit mask; none where an edge tells of none."""
-        edges = [edge for k, edge in enumerate(self._edges) if way >> k & 1]
-        if not all(len(edge.places) for edge in edges):
-            return np.empty((0, 2))
-        return np.concatenate([se2.transform_points(poses[e.first], e.places) for e in edges])
+        found = [places[k] for k in bits(way)]
+        return np.concatenate(found) if all(map(len, found)) else np.empty((0, 2))
 
 
 def _reach(raster: DistanceField, frame: FloatArray) -> float:

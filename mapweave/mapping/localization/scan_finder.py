@@ -127,9 +127,7 @@ class ScanFinder:
         thinned = oriented.at(slice(None, None, 1 + (len(oriented) - 1) // p.points))
         middle = thinned.points.mean(axis=0)
         for number, known in self._known.items():
-            likely = coarse_places(
-                (known.lines, known.coarse), (lines, coarse), p.coarse, p.verification
-            ).aligned
+            likely = coarse_places(known.coarse, coarse, p.coarse, p.verification).aligned
             if len(likely) == 0:
                 continue
             shares = self._shares(thinned, known, likely, p.roughly)

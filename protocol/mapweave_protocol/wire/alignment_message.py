@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
+from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydantic import Field, model_validator
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.maps import Alignment, Decision, RobotMap, SharedPlace, parse_component
 from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
+from mapweave.team.recent import Recent
 from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.model import (
     MAX_ALIGNMENTS,
@@ -183,6 +185,21 @@ class WireAlignment(WireModel):
         self._status()
         return self
 
+    @cached_property
+    def travelling(self) -> tuple[object, ...]:
+        """What `values` returns: of version after version, most alignments are as they were."""
+        return super().values()
+
+    def values(self) -> tuple[object, ...]:
+        """Return the values of the fields, in their order, as they travel."""
+        return self.travelling
+
+    def model_copy(self, *, update: Mapping[str, object] | None = None, deep: bool = False) -> Self:
+        """Return a copy, with other values of some fields; of its own how these travel."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__.pop("travelling", None)
+        return copied
+
     def unpack(self) -> Alignment:
         """Return the alignment."""
         return Alignment(
@@ -202,6 +219,25 @@ class WireAlignment(WireModel):
         if self.status is None:
             return None
         return Status(self.status, self.set_aside_by, self.revoked_in)
+
+
+class AlignmentPacker:
+    """Packs the alignments of one version after the other, those that changed anew."""
+
+    def __init__(self) -> None:
+        self._kept: Recent[tuple[object, ...], tuple[Alignment, WireAlignment]] = Recent()
+
+    def pack(self, alignments: Sequence[Alignment]) -> tuple[WireAlignment, ...]:
+        """Return `alignments` for the wire."""
+        self._kept.turn()
+        return tuple(self._packed(alignment)[1] for alignment in alignments)
+
+    def _packed(self, alignment: Alignment) -> tuple[Alignment, WireAlignment]:
+        """Return what is kept of `alignment`: itself, so that nothing else has its parts' ids."""
+        a = alignment
+        parts = a.transform, a.cause, a.evidence, a.runner_up, a.places
+        key = a.reference, a.other, a.decision, a.confidence, a.status, *map(id, parts)
+        return self._kept.get(key, lambda: (a, WireAlignment.pack(a)))
 
 
 def _measured(numbers: Mapping[str, float]) -> dict[str, float]:

@@ -139,15 +139,14 @@ def _extended(value: object) -> object:
 
     So is a string of 8 hexadecimal digits.
     """
-    match value:
-        case dict():
-            return {key: _extended(item) for key, item in value.items()}
-        case tuple():
-            return tuple(_extended(item) for item in value)
-        case float():
-            return _decimal(value)
-        case str() if _HEXADECIMAL.fullmatch(value):
-            return msgpack.ExtType(_BOOT, bytes.fromhex(value))
+    if isinstance(value, float):  # most of what a message holds
+        return _decimal(value)
+    if isinstance(value, tuple):
+        return tuple([_extended(item) for item in value])
+    if isinstance(value, dict):
+        return {key: _extended(item) for key, item in value.items()}
+    if isinstance(value, str) and _HEXADECIMAL.fullmatch(value):
+        return msgpack.ExtType(_BOOT, bytes.fromhex(value))
     return value
 
 

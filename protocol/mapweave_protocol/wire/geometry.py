@@ -83,6 +83,17 @@ class PackedLines:
         ValueError
             If a coordinate is beyond `reach` [m], or there is more wall than any robot maps.
         """
+        segments, polyline, support = self.check(reach)
+        return LineMap(segments, polyline, support, self.free.restore(self.lines.turn, reach))
+
+    def check(self, reach: float) -> tuple[FloatArray, IntArray, IntArray]:
+        """Return segments, polylines and support as of `CodedLines.restore`.
+
+        Raises
+        ------
+        ValueError
+            If a coordinate is beyond `reach` [m], or there is more wall than any robot maps.
+        """
         segments, polyline, support = self.lines.restore()
         # A frame that is turned lets what was at the limit come back a rounding beyond.
         if not np.all(np.abs(segments) <= 1.01 * reach):
@@ -92,7 +103,7 @@ class PackedLines:
             raise ValueError(f"{wall:.0f} m of wall, expected at most {MAX_WALL:.0f} m")
         if np.any(np.all(segments[:, :2] == segments[:, 2:], axis=1)):
             raise ValueError("a segment without length")
-        return LineMap(segments, polyline, support, self.free.restore(self.lines.turn, reach))
+        return segments, polyline, support
 
     @property
     def columns(self) -> list[IntArray]:

@@ -5,11 +5,11 @@ from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from mapweave.maps import JointComponent, JointMap
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.wire.alignment_message import WireAlignment
+from mapweave_protocol.wire.alignment_message import AlignmentPacker, WireAlignment
 from mapweave_protocol.wire.budget import MIB, Budget
 from mapweave_protocol.wire.coding import entropy
 from mapweave_protocol.wire.coding.line_code import CERTAINTIES
@@ -55,9 +55,15 @@ class WireComponent(WireModel):
     def pack(cls, component: JointComponent) -> Self:
         """Return `component` for the wire."""
         lines = PackedLines.pack(component.map, JOINT_REACH, component.segment_confidence)
-        robots = {name: to_transform(pose) for name, pose in component.robots.items()}
-        marks = tuple(WirePlacedMark.pack(mark) for mark in component.marks)
-        return cls.of_lines(robots, round(float(component.confidence), 4), lines, marks)
+        lines.check(JOINT_REACH)
+        fields = {
+            "robots": {name: to_transform(pose) for name, pose in component.robots.items()},
+            "confidence": round(float(component.confidence), 4),
+            "stream": _encoded(lines),
+            "marks": tuple(WirePlacedMark.pack(mark) for mark in component.marks),
+        }
+        # What was packed here is in order, and need not be decoded to see it.
+        return cls.model_validate(fields, context=lines)
 
     @classmethod
     def of_lines(
@@ -68,13 +74,13 @@ class WireComponent(WireModel):
         marks: tuple[WirePlacedMark, ...],
     ) -> Self:
         """Return the component of these lines, whole."""
-        encoder = entropy.encoder()
-        PackedLines.code(encoder, lines, confident=True)
-        return cls(robots=robots, confidence=confidence, stream=encoder.finish(), marks=marks)
+        return cls(robots=robots, confidence=confidence, stream=_encoded(lines), marks=marks)
 
     @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.before is None:
+    def _check(self, info: ValidationInfo) -> Self:
+        if isinstance(info.context, PackedLines):
+            self.__dict__["lines"] = info.context
+        elif self.before is None and "lines" not in self.__dict__:  # seen again with its message
             self.unpack()
         return self
 
@@ -154,13 +160,19 @@ class JointMapMessage(Message):
     )
 
     @classmethod
-    def pack(cls, joint: JointMap, series: str) -> Self:
-        """Return `joint` as the message of a version of `series`."""
+    def pack(cls, joint: JointMap, series: str, packer: AlignmentPacker | None = None) -> Self:
+        """Return `joint` as the message of a version of `series`.
+
+        Parameters
+        ----------
+        packer
+            Packed the alignments of the version before; None packs all.
+        """
         return cls(
             series=series,
             version=joint.version,
             components=tuple(WireComponent.pack(component) for component in joint.components),
-            alignments=tuple(WireAlignment.pack(alignment) for alignment in joint.alignments),
+            alignments=(packer or AlignmentPacker()).pack(joint.alignments),
             orders=tuple(WireOrder.pack(order) for order in joint.orders),
         )
 
@@ -236,6 +248,12 @@ class JointMapMessage(Message):
     def _check_follows(self, before: Self) -> None:
         if not self.follows(before):
             raise ValueError(f"expected version {self.version - 1} of {self.series} before it")
+
+
+def _encoded(lines: PackedLines) -> bytes:
+    encoder = entropy.encoder()
+    PackedLines.code(encoder, lines, confident=True)
+    return encoder.finish()
 
 
 def _since(component: WireComponent, others: Sequence[WireComponent]) -> WireComponent:

@@ -115,13 +115,12 @@ def by_name(names: Sequence[str], travelled: object) -> object:
 
 def _plain(value: object) -> object:
     """Return `value` with models as their values, whole floats as integers, others shortened."""
-    match value:
-        case WireModel():
-            return value.values()
-        case dict():
-            return {key: _plain(item) for key, item in value.items()}
-        case tuple():
-            return tuple(_plain(item) for item in value)
-        case float() if value.is_integer() and abs(value) < MAX_COUNT:
-            return int(value)
-    return value
+    if isinstance(value, str | int):  # most of what a message holds
+        return value
+    if isinstance(value, float):
+        return int(value) if value.is_integer() and abs(value) < MAX_COUNT else value
+    if isinstance(value, tuple):
+        return tuple([_plain(item) for item in value])
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return value.values() if isinstance(value, WireModel) else value

@@ -19,6 +19,7 @@ from mapweave.lines.directions import (
     line_difference,
     main_directions,
     nearest_direction,
+    turn_spectrum,
 )
 from tests.mapweave.buildings import BUILDING, part
 
@@ -151,7 +152,7 @@ def test_the_true_turn_is_among_the_likely_ones(seed: int) -> None:
     turn = rng.uniform(-np.pi, np.pi)
     halves = part(BUILDING, 0, 18).segments, part(BUILDING, 8, 30).segments
     turned = se2.transform_segments(np.array([3.0, -1.0, -turn]), halves[1])
-    found = likely_turns(halves[0], turned, 4, 0.17)
+    found = likely_turns(turn_spectrum(halves[0]), turn_spectrum(turned), 4, 0.17)
     assert np.abs(se2.wrap(found - turn)).min() < np.radians(1.5)
     apart = np.abs(se2.wrap(found[:, None] - found)) + np.pi * np.eye(len(found))
     assert apart.min() > 0.17
@@ -160,8 +161,9 @@ def test_the_true_turn_is_among_the_likely_ones(seed: int) -> None:
 def test_visible_sides_tell_half_a_turn_from_none() -> None:
     """Three walls of a room, seen from inside: only one turn lays them on themselves."""
     walls = np.array([[0.0, 0, 6, 0], [6, 0, 6, 4], [0, 4, 0, 0]])
-    assert abs(likely_turns(walls, walls, 4, 0.17)[0]) < np.radians(1)
-    assert abs(se2.wrap(likely_turns(walls, walls[:, [2, 3, 0, 1]], 4, 0.17)[0] - np.pi)) < 0.02
+    seen, back = turn_spectrum(walls), turn_spectrum(walls[:, [2, 3, 0, 1]])
+    assert abs(likely_turns(seen, seen, 4, 0.17)[0]) < np.radians(1)
+    assert abs(se2.wrap(likely_turns(seen, back, 4, 0.17)[0] - np.pi)) < 0.02
 
 
 @given(

@@ -32,7 +32,7 @@ LEFT, RIGHT = part(BUILDING, 0, 18), part(BUILDING, 8, 30)
 
 
 def places(reference: LineMap, other: LineMap) -> tuple[FloatArray, FloatArray]:
-    maps = [(lines, CoarseMap.of(lines, P, JUDGED)) for lines in (reference, other)]
+    maps = [CoarseMap.of(lines, P, JUDGED) for lines in (reference, other)]
     found = coarse_places(maps[0], maps[1], P, JUDGED)
     return found.aligned, found.scores
 
@@ -89,8 +89,8 @@ def test_a_map_of_one_wall_is_laid_along_it() -> None:
 
 
 def mirrored_most(reference: LineMap, other: LineMap) -> float:
-    maps = [(lines, CoarseMap.of(lines, P, JUDGED)) for lines in (reference, other)]
-    return most_if_mirrored(maps[0], maps[1], P, JUDGED)
+    maps = [CoarseMap.of(lines, P, JUDGED) for lines in (reference, other)]
+    return most_if_mirrored(maps[0], maps[1], other.segments, P, JUDGED)
 
 
 def test_what_fits_mirrored_counts_half_of_what_it_has_in_common_at_least(rng: Generator) -> None:
