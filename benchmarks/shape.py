@@ -122,7 +122,7 @@ def _look_up(
     known: dict[Key, Sample] = {}
     for number, sample in enumerate([*own, *(others[k] for k in drawn)]):
         known[sample.key[0], sample.key[1], number] = sample
-        index.add((sample.key[0], sample.key[1], number), sample.shape)
+        index.add((sample.key[0], sample.key[1], number), sample.shape, sample.key[:2])
     rows = []
     for sample in own:
         shared = _most_shared(sample, own)
@@ -154,7 +154,7 @@ def _row(
     """Look a submap up in all but those of its own stretch."""
     building, stretch, _ = sample.key
     start = time.process_time()
-    found = index.query(sample.shape, FIRST, lambda key: key[0] != building or key[1] != stretch)
+    found = index.query(sample.shape, FIRST, but=(building, stretch))
     took = time.process_time() - start
     right = [_is_right(sample, place, known) for place in found]
     rank = right.index(True) if True in right else None
