@@ -13,6 +13,7 @@ import shapely
 from numpy.random import Generator
 
 from benchmarks.floor_plans import DOOR, WALL, Room, plan_of, room_at, row_of_rooms, seen_in
+from benchmarks.fusion import WITHOUT, parameters_without
 from benchmarks.pairs import is_right
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.commands.progress import track
@@ -43,13 +44,15 @@ class Scene:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say how many buildings."""
     parser.add_argument("--seeds", type=int, default=50, metavar="N", help="buildings (50)")
+    parser.add_argument("--without", choices=WITHOUT, help="leave out, as of fusion")
     parser.add_argument("--output", type=Path, default=OUTPUT / "twins.json", help="%(default)s")
 
 
 def run(options: argparse.Namespace) -> None:
     """Compare the maps of every scene of every building, print how often what was decided."""
+    parameters = parameters_without(options.without)
     rows = [
-        _row(name, visits, seed, make(np.random.default_rng(seed), visits))
+        _row(name, visits, seed, make(np.random.default_rng(seed), visits), parameters)
         for seed in track(range(options.seeds), "buildings")
         for name, make in SCENES.items()
         for visits in VISITS
@@ -58,8 +61,10 @@ def run(options: argparse.Namespace) -> None:
     print(tell(rows))
 
 
-def _row(name: str, visits: int, seed: int, scene: Scene) -> dict[str, object]:
-    found = max(align(scene.first, scene.second, _PARAMETERS), key=lambda a: a.confidence)
+def _row(
+    name: str, visits: int, seed: int, scene: Scene, parameters: FusionParameters
+) -> dict[str, object]:
+    found = max(align(scene.first, scene.second, parameters), key=lambda a: a.confidence)
     joined = found.decision == "accepted"
     right = joined and _right(found, scene)
     return {
@@ -145,7 +150,6 @@ SCENES: dict[str, Callable[[Generator, int], Scene]] = {
     "twin wings": _twin_wings,
     "mirrored wings": _mirrored_wings,
 }
-_PARAMETERS = FusionParameters()
 
 
 def _with_twin(rng: Generator) -> tuple[tuple[Room, Room], list[Room]]:
