@@ -112,6 +112,7 @@ bench-robots: $(KERNELS)
 
 bench-shape: $(KERNELS)
 	$(BIN)/python -m benchmarks shape --stretches 3 6
+	$(BIN)/python -m benchmarks scale
 
 bench-fusion: $(KERNELS)
 	$(BIN)/python -m benchmarks fusion

@@ -30,6 +30,7 @@ from benchmarks import (
     wire,
 )
 from benchmarks.faults import crowd, hostile, kills, lossy, outages, subscribers
+from benchmarks.scale import command as scale
 from benchmarks.speed import command as speed
 
 
@@ -57,6 +58,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "reference": reference,
     "robots": robots,
     "peers": peers,
+    "scale": scale,
     "shape": shape,
     "same-results": same_results,
     "speed": speed,

@@ -115,7 +115,7 @@ def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None
         (first.log.building, second.log.building),
         common(first, second),
         (first.segments, second.segments),
-        tuple(_judge(first, second, alignment) for alignment in alignments),
+        tuple(judge(first, second, alignment) for alignment in alignments),
         seconds,
     )
 
@@ -125,7 +125,8 @@ def is_right(distance: float, turn: float) -> bool:
     return distance <= RIGHT_DISTANCE and turn <= RIGHT_TURN
 
 
-def _judge(first: Stretch, second: Stretch, alignment: Alignment) -> Match:
+def judge(first: Stretch, second: Stretch, alignment: Alignment) -> Match:
+    """Say how far off an alignment of two stretches is."""
     reference, other = first.parts[alignment.reference], second.parts[alignment.other]
     distance, turn, whole = math.inf, math.pi, math.inf
     if first.log.building == second.log.building:

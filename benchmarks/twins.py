@@ -6,51 +6,24 @@ Maps are cut out of a floor plan, with noise, and moved at random; there is no l
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import shapely
 from numpy.random import Generator
 
+from benchmarks.floor_plans import DOOR, WALL, Room, plan_of, room_at, row_of_rooms, seen_in
+from benchmarks.fusion import WITHOUT, parameters_without
 from benchmarks.pairs import is_right
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.commands.progress import track
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.lines.polylines import group_polylines
-from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
+from mapweave.maps import Alignment, RobotMap, Submap, Trajectory
 
-WIDTH, WALL, DOOR = 2.2, 0.2, 0.9  # [m] of a corridor, of walls, of doors
-MARGIN, NOISE = 0.15, 0.015  # [m] that free space keeps from walls; of wall ends
 SURE = 0.85
 VISITS = (1, 10)
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """A room along the corridor, from `left` to `right` [m], and what stands in it.
-
-    Attributes
-    ----------
-    door
-        Its left side [m].
-    depth
-        [m]
-    furniture
-        Left, bottom, right, top, from the room's left corner at the corridor [m].
-    """
-
-    left: float
-    right: float
-    door: float
-    depth: float
-    furniture: tuple[tuple[float, float, float, float], ...]
-
-    def shifted(self, by: float) -> "Room":
-        """Return the same room elsewhere."""
-        return Room(self.left + by, self.right + by, self.door + by, self.depth, self.furniture)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +44,15 @@ class Scene:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say how many buildings."""
     parser.add_argument("--seeds", type=int, default=50, metavar="N", help="buildings (50)")
+    parser.add_argument("--without", choices=WITHOUT, help="leave out, as of fusion")
     parser.add_argument("--output", type=Path, default=OUTPUT / "twins.json", help="%(default)s")
 
 
 def run(options: argparse.Namespace) -> None:
     """Compare the maps of every scene of every building, print how often what was decided."""
+    parameters = parameters_without(options.without)
     rows = [
-        _row(name, visits, seed, make(np.random.default_rng(seed), visits))
+        _row(name, visits, seed, make(np.random.default_rng(seed), visits), parameters)
         for seed in track(range(options.seeds), "buildings")
         for name, make in SCENES.items()
         for visits in VISITS
@@ -86,8 +61,10 @@ def run(options: argparse.Namespace) -> None:
     print(tell(rows))
 
 
-def _row(name: str, visits: int, seed: int, scene: Scene) -> dict[str, object]:
-    found = max(align(scene.first, scene.second, _PARAMETERS), key=lambda a: a.confidence)
+def _row(
+    name: str, visits: int, seed: int, scene: Scene, parameters: FusionParameters
+) -> dict[str, object]:
+    found = max(align(scene.first, scene.second, parameters), key=lambda a: a.confidence)
     joined = found.decision == "accepted"
     right = joined and _right(found, scene)
     return {
@@ -150,7 +127,7 @@ def _twin_rooms_and_between(rng: Generator, visits: int) -> Scene:
 
 def _twin_wings(rng: Generator, visits: int) -> Scene:
     """Each knows one of two equal stretches of corridor with their rooms."""
-    wing = _row_of_rooms(rng, 3)
+    wing = row_of_rooms(rng, 3)
     length = wing[-1].right + 1.0
     rooms = [*wing, *(r.shifted(length + 6.0) for r in wing)]
     one, two = (shapely.box(x, -20, x + length, 20) for x in (0.0, length + 6.0))
@@ -159,7 +136,7 @@ def _twin_wings(rng: Generator, visits: int) -> Scene:
 
 def _mirrored_wings(rng: Generator, visits: int) -> Scene:
     """Each knows one of two stretches that are mirror images of each other."""
-    wing = _row_of_rooms(rng, 3)
+    wing = row_of_rooms(rng, 3)
     length = wing[-1].right + 1.0
     rooms = [*wing, *(_mirrored(r, length + 3.0) for r in reversed(wing))]
     one, two = (shapely.box(x, -20, x + length, 20) for x in (0.0, length + 6.0))
@@ -173,34 +150,15 @@ SCENES: dict[str, Callable[[Generator, int], Scene]] = {
     "twin wings": _twin_wings,
     "mirrored wings": _mirrored_wings,
 }
-_PARAMETERS = FusionParameters()
-
-
-def _room(rng: Generator, left: float) -> Room:
-    width, depth = rng.uniform(3.2, 6.0), rng.uniform(3.5, 6.5)
-    door = left + rng.uniform(0.3, width - DOOR - 0.3)
-    things = []
-    for _ in range(rng.integers(0, 4)):
-        x, y = rng.uniform(0.2, width - 1.6), rng.uniform(1.0, depth - 1.2)
-        things.append((x, y, x + rng.uniform(0.5, 1.4), y + rng.uniform(0.4, 0.9)))
-    return Room(left, left + width, door, depth, tuple(things))
-
-
-def _row_of_rooms(rng: Generator, count: int, left: float = 1.0) -> list[Room]:
-    rooms: list[Room] = []
-    for _ in range(count):
-        rooms.append(_room(rng, left))
-        left = rooms[-1].right + WALL + rng.uniform(0.0, 1.5)
-    return rooms
 
 
 def _with_twin(rng: Generator) -> tuple[tuple[Room, Room], list[Room]]:
     """Return two equal rooms, and those with the others: before, between and behind them."""
-    before = _row_of_rooms(rng, 1)
-    twin = _room(rng, before[-1].right + WALL)
-    between = _row_of_rooms(rng, 2, twin.right + WALL)
+    before = row_of_rooms(rng, 1)
+    twin = room_at(rng, before[-1].right + WALL)
+    between = row_of_rooms(rng, 2, twin.right + WALL)
     again = twin.shifted(between[-1].right + WALL - twin.left)
-    behind = _row_of_rooms(rng, 1, again.right + WALL)
+    behind = row_of_rooms(rng, 1, again.right + WALL)
     return (twin, again), [*before, twin, *between, again, *behind]
 
 
@@ -222,21 +180,6 @@ def _mirrored(room: Room, about: float) -> Room:
     return Room(left, right, 2 * about - room.door - DOOR, room.depth, things)
 
 
-def _plan(rooms: Sequence[Room]) -> shapely.Polygon:
-    """Return what is free: a corridor, rooms below it behind doors, and nothing in furniture."""
-    parts = [shapely.box(-1.0, 0.0, rooms[-1].right + 2.0, WIDTH)]
-    for room in rooms:
-        parts.append(shapely.box(room.left, -WALL - room.depth, room.right, -WALL))
-        parts.append(shapely.box(room.door, -WALL - 0.01, room.door + DOOR, 0.01))
-    things = [
-        shapely.box(room.left + a, -WALL - d, room.left + c, -WALL - b)
-        for room in rooms
-        for a, b, c, d in room.furniture
-    ]
-    free = shapely.union_all(parts).difference(shapely.union_all(things))
-    return max(shapely.get_parts(free), key=lambda part: part.area)
-
-
 def _scene(
     rng: Generator,
     rooms: Sequence[Room],
@@ -247,7 +190,7 @@ def _scene(
     shared: bool,
 ) -> Scene:
     """Cut two maps out of a plan, the second one in a frame of its own."""
-    plan = _plan(rooms)
+    plan = plan_of(rooms)
     motion = np.array([*rng.uniform(-30, 30, 2), rng.uniform(-np.pi, np.pi)])
     first = _driven("a", plan, one, rng, visits, se2.IDENTITY)
     second = _driven("b", plan, two, rng, visits, motion)
@@ -264,31 +207,7 @@ def _driven(
 ) -> RobotMap:
     """Return the map of a robot that was there `visits` times."""
     submaps = tuple(
-        Submap(k, 0, np.zeros(3), _seen(plan, where, rng).moved(motion), Trajectory.empty())
+        Submap(k, 0, np.zeros(3), seen_in(plan, where, rng).moved(motion), Trajectory.empty())
         for k in range(visits)
     )
     return RobotMap(robot, "boot", 1, submaps)
-
-
-def _seen(plan: shapely.Polygon, where: shapely.Polygon, rng: Generator) -> LineMap:
-    """Return the walls of `plan` within a box, with noise, and the free space seen there."""
-    walls = np.concatenate([_walls(ring, where) for ring in _rings(plan)])
-    walls = walls[np.hypot(*(walls[:, 2:] - walls[:, :2]).T) > 0.1]
-    walls = walls + rng.normal(0.0, NOISE, walls.shape)
-    free = shapely.get_parts(plan.buffer(-MARGIN).intersection(where))
-    rings = tuple(np.asarray(f.exterior.coords)[:-1] for f in free if f.geom_type == "Polygon")
-    order, polyline = group_polylines(walls, 0.3)
-    return LineMap(walls[order], polyline, np.full(len(walls), 5), rings)
-
-
-def _rings(plan: shapely.Polygon) -> list[FloatArray]:
-    """Return the outlines, with what is free on their left."""
-    plan = shapely.geometry.polygon.orient(plan)
-    return [np.asarray(ring.coords) for ring in (plan.exterior, *plan.interiors)]
-
-
-def _walls(ring: FloatArray, where: shapely.Polygon) -> FloatArray:
-    """(n, 4) walls of an outline, as far as they are in a box."""
-    pieces = [shapely.LineString(pair).intersection(where) for pair in pairwise(ring)]
-    lines = [np.asarray(piece.coords).ravel() for piece in pieces if piece.length > 0]
-    return np.array(lines).reshape(-1, 4)

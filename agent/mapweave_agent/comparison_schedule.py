@@ -64,8 +64,8 @@ class ComparisonSchedule:
     """Which pair to compare next: always of the newest maps, and in the end of the last ones.
 
     Maps of runs that are over never change: each is compared with what may show its place until
-    the joint map has it there. Those whose shapes say that they saw one place come first; no other
-    waits for ever.
+    the joint map has it there. Those whose shapes say that they saw one place come first; of the
+    others, only those of small teams are compared at all.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class ComparisonSchedule:
         self._wanted: list[MapVersion] = []
         self._lacking = Lacking()
         self._pairs: dict[PairOfRuns, _Pair] = {}
-        self._encounters = Encounters(robot)
+        self._encounters = Encounters()
         self._quiet_until = -math.inf
 
     def own_map(self, robot_map: RobotMap, *, finished: bool) -> None:
@@ -238,9 +238,12 @@ class ComparisonSchedule:
         """Yield the pairs that are to be compared by us, a map of ours first."""
         assert self._own is not None  # asked before
         own = [self._own, *self._earlier.values()]
-        pairs = [*combinations(own, 2), *((a, b) for a in own for b in self._team.all)]
-        for ours, other in pairs:
-            if self._outdated(ours, other) and self._duty(ours, other):
+        others = list(self._team.all)
+        every = len(others) <= self._parameters.strangers
+        for ours, other in [*combinations(own, 2), *((a, b) for a in own for b in others)]:
+            if not self._outdated(ours, other) or not self._duty(ours, other):
+                continue
+            if every or self._likely(ours, other):
                 yield ours, other
 
     def _outdated(self, own: RobotMap, other: RobotMap) -> bool:
@@ -284,8 +287,11 @@ class ComparisonSchedule:
         if pair.waits_since is None:
             pair.waits_since = now
         patient = now - pair.waits_since < self._parameters.comparison_patience
-        likely = own is not self._own or self._encounters.likely(other.robot, other.boot)
-        return patient and not likely
+        return patient and not self._likely(own, other)
+
+    def _likely(self, own: RobotMap, other: RobotMap) -> bool:
+        """Tell whether shapes say that two runs saw one place; of runs that are over, not asked."""
+        return own is not self._own or self._encounters.likely(run_of(own), run_of(other))
 
     def _note_compared(self, ends: tuple[MapVersion, MapVersion]) -> None:
         pair = self._pair(*ends)

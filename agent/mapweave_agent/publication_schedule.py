@@ -39,6 +39,11 @@ class AgentParameters(BaseModel):
         description="[s] that a pair whose shapes do not say that both saw one place lets others"
         " go first",
     )
+    strangers: int = Field(
+        12,
+        ge=0,
+        description="runs of others up to which all are compared, whatever their shapes say",
+    )
     map_distance: float = Field(
         2.0, gt=0, description="[m] driven after which the growing submap is published"
     )

@@ -23,20 +23,21 @@ class PlaceView {
     origin_[0] = origin(0), origin_[1] = origin(1);
   }
 
-  // What the walls of `other` count in this map, at the pose x, y, theta of it.
-  double worth(const PlaceView& other, double x, double y, double theta, const In<double, 2>& table) const {
+  // What the walls of `other`, every `stride`th sample, count in this map, at the pose x, y, theta of it.
+  double worth(const PlaceView& other, double x, double y, double theta, size_t stride, const double* table,
+               size_t said, size_t directions) const {
     const double c = std::cos(theta), s = std::sin(theta), turn = theta / 6.283185307179586476925286766559 + 2;
-    const double directions = static_cast<double>(table.shape(1));
+    const double rows = static_cast<double>(rows_), columns = static_cast<double>(columns_);
     double sum = 0;
-    for (size_t k = 0; k < other.samples_.size(); k += 4) {
+    for (size_t k = 0; k < other.samples_.size(); k += 4 * stride) {
       const double* p = other.samples_.data() + k;
-      const double row = std::floor((c * p[0] - s * p[1] + x - origin_[0]) / cell_);
-      const double column = std::floor((s * p[0] + c * p[1] + y - origin_[1]) / cell_);
-      if (!(row >= 0 && column >= 0 && row < static_cast<double>(rows_) && column < static_cast<double>(columns_)))
-        continue;
+      const double row = (c * p[0] - s * p[1] + x - origin_[0]) / cell_;
+      const double column = (s * p[0] + c * p[1] + y - origin_[1]) / cell_;
+      if (!(row >= 0 && column >= 0 && row < rows && column < columns)) continue;
       const size_t code = codes_[static_cast<size_t>(row) * columns_ + static_cast<size_t>(column)];
-      const size_t facing = static_cast<size_t>((p[2] + turn) * directions) % table.shape(1);
-      if (code < table.shape(0)) sum += p[3] * table(code, facing);
+      size_t facing = static_cast<size_t>((p[2] + turn) * static_cast<double>(directions));
+      while (facing >= directions) facing -= directions;  // thrice at most: sooner done than a division
+      if (code < said) sum += p[3] * table[code * directions + facing];
     }
     return sum;
   }
@@ -64,20 +65,24 @@ class PlaceView {
   std::vector<double> samples_;
 };
 
-// (n,) what each of `views` and `other` say of the pose of `other` in it, the mean of both.
+// (n,) what each of `views` and `other` say of the pose of `other` in it, the mean of both, by every `stride`th
+// sample.
 inline Out<double> score_views(const PlaceView& other, const std::vector<const PlaceView*>& views,
-                               In<double, 2> transforms, In<double, 2> table) {
-  if (transforms.shape(0) != views.size() || transforms.shape(1) != 3 || table.shape(1) == 0)
-    throw std::invalid_argument("transforms (n, 3) of n views, table (codes, directions) expected");
+                               In<double, 2> transforms, In<double, 2> table, int64_t stride) {
+  if (transforms.shape(0) != views.size() || transforms.shape(1) != 3 || table.shape(1) == 0 || stride < 1)
+    throw std::invalid_argument("transforms (n, 3) of n views, table (codes, directions), stride >= 1 expected");
   std::vector<double> scores(views.size());
   for (size_t k = 0; k < views.size(); ++k) {
     const double x = transforms(k, 0), y = transforms(k, 1), theta = transforms(k, 2);
     if (!(std::isfinite(x) && std::isfinite(y) && std::abs(theta) < 7))
       throw std::invalid_argument("transforms: finite numbers, angles within a turn expected");
     const double c = std::cos(theta), s = std::sin(theta);
-    const double there = views[k]->worth(other, x, y, theta, table);
-    const double back = other.worth(*views[k], -c * x - s * y, s * x - c * y, -theta, table);
-    scores[k] = (there + back) / 2;
+    const auto worth = [&](const PlaceView& in, const PlaceView& of, double px, double py, double turn) {
+      return in.worth(of, px, py, turn, static_cast<size_t>(stride), table.data(), table.shape(0), table.shape(1));
+    };
+    const double there = worth(*views[k], other, x, y, theta);
+    const double back = worth(other, *views[k], -c * x - s * y, s * x - c * y, -theta);
+    scores[k] = static_cast<double>(stride) * (there + back) / 2;
   }
   const size_t n = scores.size();
   return give(std::move(scores), {n});
@@ -90,5 +95,6 @@ inline void bind_place_views(nb::module_& m) {
   nb::class_<PlaceView>(m, "PlaceView")
       .def(nb::init<In<uint8_t, 2>, In<double, 1>, double, In<double, 2>>(), nb::arg("codes"), nb::arg("origin"),
            nb::arg("cell"), nb::arg("samples"));
-  m.def("score_views", &score_views, nb::arg("other"), nb::arg("views"), nb::arg("transforms"), nb::arg("table"));
+  m.def("score_views", &score_views, nb::arg("other"), nb::arg("views"), nb::arg("transforms"), nb::arg("table"),
+        nb::arg("stride"));
 }

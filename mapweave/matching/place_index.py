@@ -7,14 +7,14 @@ transform. What is voted most is scored by what both saw, walls and free space, 
 returned. Neither grows much with the number of maps: what is looked at is bounded.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view, score_views
 from mapweave.kernels.matching.rasters import cell_codes
 from mapweave.kernels.matching.shape_index import IndexSettings, shape_index
@@ -26,13 +26,15 @@ from mapweave.shape.words import ShapeWords, WordParameters, shape_words
 
 DIRECTIONS = 32  # of walls that views tell apart: 11° each
 NOTHING, SEEN_THROUGH = DIRECTIONS, DIRECTIONS + 1  # what a cell without a wall says
+NOBODY = -1  # owns what was forgotten
 Key = TypeVar("Key", bound=Hashable)
 
 
 class PlaceIndexParameters(StageParameters):
     """How words are told apart, and how much is looked at.
 
-    Chosen on submaps of `csail-thinned`, `fr079` and `seattle` in 6 stretches each, among 1000.
+    Chosen on submaps of `csail-thinned`, `fr079` and `seattle` in 6 stretches each, among 1000;
+    how many are voted and scored, on six logs in 4 and 7.
     """
 
     words: WordParameters = WordParameters()
@@ -43,8 +45,10 @@ class PlaceIndexParameters(StageParameters):
     turn_tolerance: float = Field(0.09, gt=0, description="[rad] between those: 5°")
     cell: float = Field(0.25, gt=0, description="[m] that votes are counted in, thrice as wide")
     cell_turns: int = Field(90, ge=3, description="of a turn, likewise: 4°")
-    budget: int = Field(30_000, ge=1, description="words alike that are looked at, the rarest")
-    voted: int = Field(80, ge=1, description="places that are scored, the most voted")
+    budget: int = Field(12_000, ge=1, description="words alike that are looked at, the rarest")
+    voted: int = Field(400, ge=1, description="places that are looked at, the most voted")
+    stride: int = Field(4, ge=1, description="of the samples these are scored by at first")
+    scored: int = Field(40, ge=1, description="of them that are scored by all samples, the best")
     distance: float = Field(0.35, gt=0, description="[m] between different places of one map")
     turn: float = Field(0.1, gt=0, description="[rad] between those: 6°")
     raster: DistanceFieldParameters = derived(
@@ -102,6 +106,8 @@ class PlaceIndex(Generic[Key]):
         self._slots: dict[Key, int] = {}
         self._keys: list[Key | None] = []
         self._views: list[PlaceView | None] = []
+        self._owners: dict[Hashable, int] = {}
+        self._owner: IntArray = np.full(64, NOBODY)  # of each slot, and room for more
         self._table = _worth(p.verification)
 
     def __len__(self) -> int:
@@ -115,13 +121,22 @@ class PlaceIndex(Generic[Key]):
         words = shape_words(lines.segments, self._p.words)
         return PlaceShape(words, _view(lines, self._p))
 
-    def add(self, key: Key, shape: PlaceShape) -> None:
-        """Take a map in; one of that name before is forgotten."""
+    def add(self, key: Key, shape: PlaceShape, owner: Hashable = None) -> None:
+        """Take a map in; one of that name before is forgotten.
+
+        Parameters
+        ----------
+        owner
+            Whose it is, such as a robot.
+        """
         self.discard(key)
         slot = self._words.add(shape.words.words, shape.words.kind)
         self._slots[key] = slot
         self._keys.append(key)
         self._views.append(shape.view)
+        if slot >= len(self._owner):
+            self._owner = np.concatenate([self._owner, np.full(len(self._owner), NOBODY)])
+        self._owner[slot] = self._owners.setdefault(owner, len(self._owners))
 
     def discard(self, key: Key) -> None:
         """Forget a map, if it is known."""
@@ -129,34 +144,42 @@ class PlaceIndex(Generic[Key]):
         if slot is not None:
             self._words.remove(slot)
             self._keys[slot] = self._views[slot] = None
+            self._owner[slot] = NOBODY
 
-    def query(
-        self, shape: PlaceShape, count: int = 5, wanted: Callable[[Key], bool] = lambda _: True
-    ) -> list[Place[Key]]:
+    def query(self, shape: PlaceShape, count: int = 5, *, but: Hashable = None) -> list[Place[Key]]:
         """Return at most `count` places where `shape` may be, those that most speaks for first.
 
         Parameters
         ----------
-        wanted
-            Whether a map is looked in, such as one of another robot.
+        but
+            Whose maps are not looked in, unless it is None.
         """
         p, words = self._p, shape.words
-        allowed = np.array([k is not None and wanted(k) for k in self._keys], dtype=np.uint8)
+        owner = self._owner[: len(self._keys)]
+        left_out = NOBODY if but is None else self._owners.get(but, NOBODY)
+        allowed = (owner != NOBODY) & (owner != left_out)
         slots, transforms, votes = self._words.places(
-            *(words.words, words.kind, words.middle, allowed),
+            *(words.words, words.kind, words.middle, allowed.astype(np.uint8)),
             *(p.budget, p.voted, p.distance, p.turn),
         )
-        views = [self._views[slot] for slot in slots.tolist()]
-        scores = score_views(
-            shape.view, [v for v in views if v is not None], transforms, self._table
-        )
-        best = np.argsort(-scores, kind="stable")[:count].tolist()
-        named = [(self._keys[slots[k]], k) for k in best]
+        # By few samples first: what is voted most is many times what is worth a closer look.
+        rough = self._scores(shape, slots, transforms, p.stride)
+        kept = np.argsort(-rough, kind="stable")[: p.scored]
+        scores = self._scores(shape, slots[kept], transforms[kept], 1)
+        ranked = np.argsort(-scores, kind="stable")[:count]
+        named = [(self._keys[slots[kept[k]]], k, kept[k]) for k in ranked.tolist()]
         return [
-            Place(key, transforms[k], float(scores[k]), float(votes[k]))
-            for key, k in named
+            Place(key, transforms[place], float(scores[k]), float(votes[place]))
+            for key, k, place in named
             if key is not None
         ]
+
+    def _scores(
+        self, shape: PlaceShape, slots: IntArray, transforms: FloatArray, stride: int
+    ) -> FloatArray:
+        """(n,) what both maps say of each place [m]."""
+        views = [view for slot in slots.tolist() if (view := self._views[slot]) is not None]
+        return score_views(shape.view, views, transforms, self._table, stride)
 
 
 def _view(lines: LineMap, p: PlaceIndexParameters) -> PlaceView:

@@ -22,16 +22,18 @@ class WordParameters(BaseModel):
     """Which pairs of wall ends are words.
 
     Found on submaps of four logs in 6 stretches each, among 1000: pairs of ends had a right place
-    first among the voted ones for 85 % of the submaps, pairs of corners for 57 %.
+    first among the voted ones for 85 % of the submaps, pairs of corners for 57 %. Ends of short
+    walls are not seen alike twice: of walls of 0.4 m and more 96.1 % of submaps had a right place
+    among 400 voted, of 0.8 m and more 98.3 % (six logs in 4 and 7 stretches).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    min_length: float = Field(0.4, gt=0, description="[m] of a wall, for a direction worth using")
+    min_length: float = Field(0.8, gt=0, description="[m] of a wall, for a direction worth using")
     max_walls: int = Field(200, ge=2, description="of a map, the longest")
     nearest: float = Field(0.7, gt=0, description="[m] between the ends of a word, at least")
-    farthest: float = Field(6.0, gt=0, lt=60, description="[m] between them, at most")
-    max_words: int = Field(1600, ge=1, description="of a map, those of the longest walls")
+    farthest: float = Field(7.0, gt=0, lt=60, description="[m] between them, at most")
+    max_words: int = Field(1200, ge=1, description="of a map, those of the longest walls")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -423,16 +423,29 @@ def test_maps_whose_shapes_say_nothing_are_compared_once_they_have_waited() -> N
     assert {later.peer, after.peer} == {likely, unlikely}
 
 
+def test_in_a_large_team_maps_whose_shapes_say_nothing_are_not_compared() -> None:
+    for strangers, compared in ((2, 2), (1, 1)):
+        plan, likely, unlikely = plan_among_strangers(strangers)
+        peers = []
+        for turn in range(3):
+            comparison = plan.begin(1e9)
+            if comparison is not None:
+                peers.append(comparison.peer)
+                plan.done(comparison, 1e9, 0.1)
+            assert plan.idle == (turn + 1 >= compared)
+        assert peers == [likely, unlikely][:compared]
+
+
 def seen_by(robot: str, lines: LineMap, version: int = 1) -> RobotMap:
     submap = Submap(0, 0, np.zeros(3), lines, Trajectory.empty())
     return RobotMap(robot, "x", version, (submap,))
 
 
-def plan_among_strangers() -> tuple[ComparisonSchedule, str, str]:
+def plan_among_strangers(strangers: int = 2) -> tuple[ComparisonSchedule, str, str]:
     """Return a plan, a peer that saw what this robot saw, and one that comes before it by name."""
     robot = "r"
     unlikely, likely = (n for n in PEERS if responsible(robot, n) == robot)
-    plan = ComparisonSchedule(robot, PARAMETERS)
+    plan = ComparisonSchedule(robot, PARAMETERS.model_copy(update={"strangers": strangers}))
     plan.own_map(seen_by(robot, part(BUILDING, 0.0, 14.0)), finished=False)
     for peer, lines in ((unlikely, ELSEWHERE), (likely, part(BUILDING, 4.0, 16.0))):
         plan.peer_here(peer, "x")

@@ -25,10 +25,12 @@ class PlaceViewNumpy:
     def __init__(self, codes: Codes, origin: FloatArray, cell: float, samples: FloatArray) -> None:
         self.codes, self.origin, self.cell, self.samples = codes, origin, cell, samples
 
-    def worth(self, other: "PlaceViewNumpy", pose: FloatArray, table: FloatArray) -> float:
+    def worth(
+        self, other: "PlaceViewNumpy", pose: FloatArray, table: FloatArray, stride: int
+    ) -> float:
         """Return what the walls of `other` count in this map, at the `pose` (3,) of it."""
         c, s = np.cos(pose[2]), np.sin(pose[2])
-        x, y, facing, metres = other.samples.T
+        x, y, facing, metres = other.samples[::stride].T
         placed = np.column_stack([c * x - s * y + pose[0], s * x + c * y + pose[1]])
         cells = np.floor((placed - self.origin) / self.cell).astype(np.int64)
         inside = np.all((cells >= 0) & (cells < self.codes.shape), axis=1)
@@ -61,18 +63,24 @@ def score_views_numpy(
     views: Sequence[PlaceViewNumpy],
     transforms: FloatArray,
     table: FloatArray,
+    stride: int,
 ) -> FloatArray:
     """Twin of `score_views`."""
     scores = np.empty(len(views))
     for k, (view, t) in enumerate(zip(views, transforms, strict=True)):
         c, s = np.cos(t[2]), np.sin(t[2])
         back = np.array([-c * t[0] - s * t[1], s * t[0] - c * t[1], -t[2]])
-        scores[k] = (view.worth(other, t, table) + other.worth(view, back, table)) / 2
+        both = view.worth(other, t, table, stride) + other.worth(view, back, table, stride)
+        scores[k] = stride * both / 2
     return scores
 
 
 def score_views(
-    other: PlaceView, views: Sequence[PlaceView], transforms: FloatArray, table: FloatArray
+    other: PlaceView,
+    views: Sequence[PlaceView],
+    transforms: FloatArray,
+    table: FloatArray,
+    stride: int = 1,
 ) -> FloatArray:
     """Return (n,) what each of `views` and `other` say of transforms between them, their mean.
 
@@ -82,8 +90,10 @@ def score_views(
         (n, 3) from `other` to each view [m, m, rad].
     table
         (codes, directions) what a metre of wall counts in a cell of each code, by its direction.
+    stride
+        Which samples are looked up: each, every second and so on; those stand for the others.
     """
     if COMPILED is None:
         twins = cast("list[PlaceViewNumpy]", [other, *views])
-        return score_views_numpy(twins[0], twins[1:], transforms, table)
-    return cast("FloatArray", COMPILED.score_views(other, list(views), transforms, table))
+        return score_views_numpy(twins[0], twins[1:], transforms, table, stride)
+    return cast("FloatArray", COMPILED.score_views(other, list(views), transforms, table, stride))

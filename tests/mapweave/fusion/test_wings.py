@@ -5,6 +5,7 @@ import pytest
 
 from mapweave.fusion.align import FusionParameters, align_maps, prepare
 from mapweave.fusion.crossings import crossed
+from mapweave.fusion.wings import told_by_kind
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap
@@ -88,3 +89,16 @@ def test_bare_wings_of_which_a_door_is_elsewhere_are_of_one_kind() -> None:
     here, there = rooms(5.0, 0.0, 13.0), rooms(7.5, 3.0, 16.0)
     assert seen_twice(here, rooms(5.0, 3.0, 16.0)).decision == "accepted"
     assert seen_twice(here, there).cause.kind is ReasonKind.ONE_KIND
+
+
+def told_at_a_place(here: LineMap, there: LineMap, dissimilar: float) -> bool:
+    parameters = P.wings.model_copy(update={"dissimilar": dissimilar})
+    shapes = (prepared(with_walls(lines, THING)) for lines in (here, there))
+    return told_by_kind(*shapes, se2.IDENTITY, P.verification, parameters, rigid=False)
+
+
+def test_bent_maps_are_dissimilar_where_much_wall_lies_across_passages_odd_things_or_not() -> None:
+    here, there = rooms(5.0, 0.0, 13.0), rooms(7.5, 3.0, 16.0)
+    assert told_at_a_place(here, there, 0.02)  # some 44 m are in common
+    assert not told_at_a_place(here, there, 0.08)
+    assert not told_at_a_place(here, rooms(5.0, 3.0, 16.0), 0.02)

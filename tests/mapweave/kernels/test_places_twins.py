@@ -81,11 +81,12 @@ def test_views_score_as_their_twins_do(seed: int) -> None:
     ]
     motions = np.column_stack([rng.normal(size=(3, 2)), rng.uniform(-np.pi, np.pi, 3)])
     ours, twins = [COMPILED.PlaceView(*p) for p in parts], [PlaceViewNumpy(*p) for p in parts]
-    np.testing.assert_allclose(
-        COMPILED.score_views(ours[0], ours[1:], motions, table),
-        score_views_numpy(twins[0], twins[1:], motions, table),
-        atol=1e-9,
-    )
+    for stride in (1, 4):
+        np.testing.assert_allclose(
+            COMPILED.score_views(ours[0], ours[1:], motions, table, stride),
+            score_views_numpy(twins[0], twins[1:], motions, table, stride),
+            atol=1e-9,
+        )
 
 
 def makes() -> list[type]:

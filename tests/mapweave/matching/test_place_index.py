@@ -20,7 +20,7 @@ def filled() -> PlaceIndex[str]:
     index: PlaceIndex[str] = PlaceIndex()
     for name, building in (("one", BUILDING), ("other", OTHER_BUILDING)):
         for k, left in enumerate((0.0, 8.0, 16.0)):
-            index.add(f"{name}/{k}", index.prepare(part(building, left, left + 12.0)))
+            index.add(f"{name}/{k}", index.prepare(part(building, left, left + 12.0)), name)
     return index
 
 
@@ -41,11 +41,22 @@ def test_a_map_is_found_where_it_is() -> None:
     assert found[0].score > 5.0
 
 
-def test_only_wanted_maps_are_looked_in() -> None:
+def test_maps_of_one_owner_are_left_out() -> None:
     index = filled()
     shape = index.prepare(moved(part(BUILDING, 6.0, 18.0)))
-    assert all(p.key.startswith("other") for p in index.query(shape, wanted=lambda k: k[1] == "t"))
-    assert index.query(shape, wanted=lambda _: False) == []
+    assert any(place.key.startswith("one") for place in index.query(shape, but="nobody"))
+    found = index.query(shape, but="one")
+    assert found
+    assert all(place.key.startswith("other") for place in found)
+
+
+def test_more_maps_than_there_was_room_for_are_all_found() -> None:
+    index: PlaceIndex[int] = PlaceIndex()
+    shape = index.prepare(part(BUILDING, 0.0, 12.0))
+    for k in range(150):
+        index.add(k, shape, k % 2)
+    assert {place.key for place in index.query(shape, 150, but=0)} <= set(range(1, 150, 2))
+    assert index.query(shape, 150, but=0)
 
 
 def test_a_map_that_is_forgotten_or_replaced_is_found_no_more() -> None:

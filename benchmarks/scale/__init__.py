@@ -1,0 +1,1 @@
+"""A team of many robots on a virtual clock."""
