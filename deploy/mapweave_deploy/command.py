@@ -24,6 +24,7 @@ from mapweave_deploy.run.launcher import (
     Plan,
     TeamOutcome,
     free_endpoint,
+    page_of,
     run_team,
     start_server,
     with_free_port,
@@ -184,8 +185,6 @@ def _source(options: argparse.Namespace) -> str:
 def _how_to_watch(plan: Plan) -> Iterator[str]:
     keys = "" if plan.keys is None else " --tls DIR, with keys of the team"
     yield f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}{keys}"
-    if plan.page is not None:
-        yield f"Live page: {plan.page.url(plan.token)}"
 
 
 def _is_attended(console: Console) -> bool:
@@ -197,8 +196,7 @@ def _stay(crew: ProcessGroup, plan: Plan, store: Path, console: Console) -> None
     """Serve what was stored until Ctrl-C, which is the way to end this."""
     stopping = stop_on_signal()
     start_server(crew, plan, store)
-    page = [] if plan.page is None else [f"Live page: {plan.page.url(plan.token)}"]
-    _say(console, [*page, "Router and coordinator stay; Ctrl-C ends them."])
+    _say(console, [*page_of(crew, plan), "Router and coordinator stay; Ctrl-C ends them."])
     while not stopping():
         crew.check()
         time.sleep(NAP)

@@ -51,7 +51,7 @@ class Bars:
 
     def say(self, line: str) -> None:
         """Show a line of what happens."""
-        self._progress.console.print(Text(line))
+        self._progress.console.print(Text(line), soft_wrap=True)
 
     def update(self, statuses: Mapping[str, StatusMessage]) -> None:
         """Show how far each robot is."""

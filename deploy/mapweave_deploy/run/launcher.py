@@ -31,6 +31,7 @@ from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 
 ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
 ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things
+PAGE_PATIENCE = 60.0  # [s] for the coordinator to serve its page, while agents start as well
 POLL = 0.2  # [s] after which a dead process or the end is noticed
 CAPACITY = 100_000  # messages waiting to be counted
 
@@ -176,6 +177,8 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
         session.declare_subscriber(everything(plan.team), inbox.put),
     ):
         _start_all(crew, plan, session)
+        for line in page_of(crew, plan):
+            display.say(line)
         while not is_done(plan.robots, recorder.statuses):
             _follow(crew, inbox, recorder, display)
             _check_time(plan, deadline, _unfinished(plan, recorder))
@@ -193,11 +196,25 @@ def start_router(crew: ProcessGroup, plan: Plan) -> None:
     """Start the router and wait until it listens."""
     crew.start("router", ROUTER, ["router", "--listen", plan.listen, *plan.proof(Role.ROUTER)])
     host, _, port = plan.listen.partition("/")[2].rpartition(":")
-    deadline = time.monotonic() + ROUTER_PATIENCE
-    while not _listens(host, int(port)):
+    _wait_until_it_listens(crew, host, int(port), "router", ROUTER_PATIENCE)
+
+
+def page_of(crew: ProcessGroup, plan: Plan) -> list[str]:
+    """Return the line that names the live page, once it can be opened; none where there is none."""
+    if plan.page is None:
+        return []
+    _wait_until_it_listens(crew, plan.page.host, plan.page.port, "live page", PAGE_PATIENCE)
+    return [f"Live page: {plan.page.url(plan.token)}"]
+
+
+def _wait_until_it_listens(
+    crew: ProcessGroup, host: str, port: int, name: str, patience: float
+) -> None:
+    deadline = time.monotonic() + patience
+    while not _listens(host, port):
         crew.check()
         if time.monotonic() > deadline:
-            raise TeamTimeoutError(ROUTER_PATIENCE, ["router"])
+            raise TeamTimeoutError(patience, [name])
         time.sleep(POLL / 4)
     crew.check()
 

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -69,7 +68,6 @@ def arguments(folder: Path) -> list[str]:
 def test_the_page_shows_the_map_that_is_written_and_stays_until_ctrl_c(tmp_path: Path) -> None:
     with team_at_a_terminal(tmp_path) as team, chromium() as browser:
         url = team.wait_for(r"Live page: (http://127\.0\.0\.1:\d+/#token=\w+)")[1]
-        _wait_for_page(url)
         with visit(browser, url) as seen:
             expect(seen.tab.locator("#headline")).to_contain_text(
                 "2 robots in", timeout=1000 * PATIENCE
@@ -89,17 +87,6 @@ def test_the_page_shows_the_map_that_is_written_and_stays_until_ctrl_c(tmp_path:
         assert team.process.poll() is None
         team.process.send_signal(signal.SIGINT)
         assert team.process.wait(60) == 0
-
-
-def _wait_for_page(url: str) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        try:
-            with urllib.request.urlopen(url, timeout=5):
-                return
-        except OSError:
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
 
 
 def test_where_nobody_is_there_to_end_it_the_team_ends_by_itself(tmp_path: Path) -> None:
