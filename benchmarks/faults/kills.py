@@ -260,10 +260,28 @@ def differences(quiet: Result, disturbed: Result) -> Iterator[str]:
         for _, frame, scans in disturbed.places():
             sizes[frame] += len(scans)
         told = ", ".join(f"{frame} of {size} scans" for frame, size in sizes.most_common())
-        yield f"joint components: {told}; undisturbed {sorted(parts)}"
+        apart = [frame for frame, _ in sizes.most_common()][len(parts) :]
+        yield "\n".join(
+            [
+                f"joint components: {told}; undisturbed {sorted(parts)}",
+                *_found(disturbed, apart),
+            ]
+        )
     lost = truth.keys() - seen
     if lost:
         yield f"scans lost: {len(lost)} of {len(truth)}, such as {sorted(lost)[:5]}"
+
+
+def _found(disturbed: Result, apart: Sequence[str]) -> Iterator[str]:
+    """Yield what was found of each component that stayed `apart`."""
+    for name in apart:
+        told = [
+            f"  {a.reference} + {a.other} {a.decision}, {a.confidence:.0%}: {a.reason}"
+            for a in disturbed.joint.alignments
+            if name in (a.reference, a.other)
+        ]
+        yield f"{name} was compared {len(told)} times"
+        yield from told
 
 
 def _off(name: str, poses: FloatArray, true: FloatArray) -> Iterator[str]:
