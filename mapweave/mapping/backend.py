@@ -17,6 +17,7 @@ from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.mapping.component_merging import ComponentMerger, ComponentMergingParameters
 from mapweave.mapping.drifted_paths import SURE, carried, found_again, is_near
 from mapweave.mapping.kidnap_detection import KidnapDetectionParameters, KidnapDetector, Kidnapping
+from mapweave.mapping.localization.fragments import FragmentFinder, FragmentParameters
 from mapweave.mapping.loop_closing import LoopCloser, LoopParameters
 from mapweave.mapping.submap_builder import SubmapBuilder, SubmapParameters
 from mapweave.mapping.tracking.observation import Observation
@@ -32,6 +33,7 @@ class BackendParameters(StageParameters):
 
     submap: SubmapParameters = derived(SubmapParameters.of)
     component_merging: ComponentMergingParameters = derived(ComponentMergingParameters.of)
+    fragments: FragmentParameters = derived(FragmentParameters.of)
     loops: LoopParameters = derived(LoopParameters.of)
     kidnapping: KidnapDetectionParameters = derived(KidnapDetectionParameters.of)
     refinement: MultiviewIcpParameters = derived(MultiviewIcpParameters.of)
@@ -124,6 +126,7 @@ class Backend:
         self._parameters = parameters
         self._submaps = list(known)
         self._component_merger = ComponentMerger(parameters.component_merging)
+        self._fragments = FragmentFinder(parameters.fragments)
         self._loops = LoopCloser(parameters.loops)
         self._loops.graph.take_over(known)
         self._kidnap_detector = KidnapDetector(parameters.kidnapping)
@@ -158,7 +161,7 @@ class Backend:
             parts = _cut(finished, at, self._parameters.submap)
             submaps = self._departed(submaps, at, [part.submap for part in parts])
             self._tracked = submaps[-1].id - at.submap + 1 if len(parts) == 1 else 1
-        submaps, joints = self._component_merger.reunite(submaps, self._tracked)
+        submaps, joints = self._joined(submaps, parts)
         for older, younger in joints:
             self._loops.graph.join(submaps[older], submaps[younger])
         if joints or at is not None:
@@ -171,6 +174,22 @@ class Backend:
         poses = np.array([s.pose for s in self._submaps])
         newest = finished.submap.component if at is None else finished.spare
         return BackendResult(component, poses, tuple(renewed), newest, is_held)
+
+    def _joined(
+        self, submaps: list[Submap], parts: Sequence["_Part"]
+    ) -> tuple[list[Submap], list[tuple[int, int]]]:
+        """Join components: a fragment where single scans of it are found, others by their shapes.
+
+        Returns the submaps, and for each join the ids of one of the older, one of the younger.
+        """
+        for part in parts:
+            self._fragments.note(part.submap, part.scans)
+        taken = self._fragments.take_up(submaps)
+        if taken is None:
+            return self._component_merger.reunite(submaps, self._tracked)
+        self._component_merger.forget()
+        submaps, joints = self._component_merger.reunite(taken.submaps, self._tracked)
+        return submaps, [taken.joint, *joints]
 
     def _is_held(self, newest: Submap) -> bool:
         """Whether the newest submap is linked with an older one, not the last, that was sure."""

@@ -127,6 +127,10 @@ class ComponentMerger:
             self._place_recognizer.forget()
         return joined, joints
 
+    def forget(self) -> None:
+        """Rely on no frame that it remembers, as when components were joined by others."""
+        self._place_recognizer.forget()
+
     def _recognised(
         self, submaps: list[Submap], tracked: int
     ) -> tuple[list[Submap], list[tuple[int, int]]]:

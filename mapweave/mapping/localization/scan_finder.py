@@ -6,14 +6,14 @@ walls, or where the map was seen through; and known walls that the scan sees thr
 is a rival: by how much a place must be ahead of it grows with what the place leaves unexplained.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.mapping.localization.known_map import KnownMap
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.maps import LineMap
@@ -76,6 +76,22 @@ class ScanPlace(NamedTuple):
     common: float
 
 
+class SeenFrom(NamedTuple):
+    """A scan, and its pose (3,) in a frame that some scans share."""
+
+    scan: Observation
+    pose: FloatArray
+
+
+def _worth(place: ScanPlace) -> float:
+    return place.worth
+
+
+def _anywhere(poses: FloatArray) -> BoolArray:
+    """All of (k, 3) `poses` can be."""
+    return np.ones(len(poses), dtype=np.bool_)
+
+
 class _Known(NamedTuple):
     """A component as it is looked in."""
 
@@ -100,17 +116,58 @@ class ScanFinder:
 
     def find(self, seen: Observation) -> ScanPlace | None:
         """Return where a scan is, if no other place is about as good."""
-        p, lines = self._p, self._lines(seen)
-        if len(lines.segments) == 0 or len(seen.oriented) == 0:
-            return None
-        places = sorted(self._places(seen.oriented, lines), key=lambda each: -each.worth)
+        return self.find_together([SeenFrom(seen, se2.IDENTITY)])
+
+    def find_together(
+        self,
+        seen: Sequence[SeenFrom],
+        allows: Callable[[FloatArray], BoolArray] = _anywhere,
+    ) -> ScanPlace | None:
+        """Return where the first of some scans is, if no other place is about as good for all.
+
+        Each of them proposes places, and all of them judge these.
+
+        Parameters
+        ----------
+        allows
+            Tells which of (k, 3) poses of the first can be. One of the others speaks against all
+            of these if it is worth more.
+        """
+        told = [each for each in seen if len(each.scan.oriented) and len(each.scan.segments)]
+        places = [place for k in range(len(told)) for place in self._places_of_first(told, k)]
         if not places:
             return None
-        best = places[0]
-        rival = max((t.worth for t in places[1:] if self._differs(best, t)), default=-1.0)
+        possible = allows(np.array([each.pose for each in places]))
+        best = max(
+            (t for t, can in zip(places, possible, strict=True) if can), key=_worth, default=None
+        )
+        return best if best is not None and self._is_proven(best, places, possible) else None
+
+    def _is_proven(self, best: ScanPlace, places: list[ScanPlace], possible: BoolArray) -> bool:
+        """Whether a place is worth much, and more than what may be instead."""
+        p = self._p
+        rival = elsewhere = -1.0
+        for place, can in zip(places, possible.tolist(), strict=True):
+            if not can:
+                elsewhere = max(elsewhere, place.worth)
+            elif self._differs(best, place):
+                rival = max(rival, place.worth)
         lead = p.lead + p.lead_share * (1.0 - best.worth)
-        proven = best.worth >= max(p.least, rival + lead) and best.common >= p.least_wall
-        return best if proven else None
+        least = max(p.least, rival + lead, elsewhere - p.lead)
+        return best.worth >= least and best.common >= p.least_wall
+
+    def _places_of_first(self, seen: Sequence[SeenFrom], k: int) -> Iterable[ScanPlace]:
+        """Yield where the first of some scans is by what number `k` proposes, worth to all."""
+        own = se2.between(seen[0].pose, seen[k].pose)
+        for place in self._places(seen[k].scan):
+            first, known = se2.compose(place.pose, se2.inverse(own)), self._known[place.component]
+            worth = place.worth
+            for other in (each for m, each in enumerate(seen) if m != k):
+                at = se2.compose(first, se2.between(seen[0].pose, other.pose))
+                worth += float(
+                    self._shares(other.scan.oriented, known, at[None], self._p.roughly)[0]
+                )
+            yield ScanPlace(place.component, first, worth / len(seen), place.common)
 
     def _lines(self, seen: Observation) -> LineMap:
         """Return the scan as a line map in its own frame, with the free space that it saw."""
@@ -119,9 +176,9 @@ class ScanFinder:
         support = np.full(len(lines.segments), self._p.raster.full_support)
         return LineMap(lines.segments, lines.polyline, support, rings(free))
 
-    def _places(self, oriented: OrientedPoints, lines: LineMap) -> Iterable[ScanPlace]:
-        """Yield the places in all components that are worth most, aligned."""
-        p = self._p
+    def _places(self, seen: Observation) -> Iterable[ScanPlace]:
+        """Yield the places of a scan in all components that are worth most, aligned."""
+        p, oriented, lines = self._p, seen.oriented, self._lines(seen)
         coarse = CoarseMap.of(lines, p.coarse, p.verification)
         field = DistanceField.of(lines, p.raster)
         thinned = oriented.at(slice(None, None, 1 + (len(oriented) - 1) // p.points))

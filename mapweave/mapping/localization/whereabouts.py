@@ -1,0 +1,142 @@
+"""Where a robot can have been while it was lost: near where it was before, and after.
+
+Stamps and the usual time of a scan say how long it was lost, its speed and turn rate how far it
+came meanwhile at the most. Most robots are slower than that: where they were tracked, their steps
+from scan to scan tell how far they usually come.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+from pydantic import Field
+
+from mapweave.geometry import se2
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.maps import Submap
+from mapweave.parameters import StageParameters, derived
+
+
+class WhereaboutsParameters(StageParameters):
+    """What a robot can do, and what is nearby."""
+
+    max_speed: float = derived(lambda c: c.robot.max_speed, gt=0, description="[m/s]")
+    max_turn_rate: float = derived(lambda c: c.robot.max_turn_rate, gt=0, description="[rad/s]")
+    slack: float = derived(
+        lambda c: 2 * c.mapping.closeness, gt=0, description="[m] more, as poses err"
+    )
+    turn_slack: float = derived(
+        lambda c: c.mapping.keyframe_turn, gt=0, description="[rad] more, as poses err"
+    )
+    paced: float = Field(
+        1.5, ge=1, description="times the longer steps from scan to scan, of what was tracked"
+    )
+    longer: float = Field(
+        0.95, gt=0, le=1, description="share of the steps that is shorter than those"
+    )
+    few: int = Field(10, ge=1, description="steps, of which nothing is concluded")
+    untold: float = derived(
+        lambda c: 1.5 * c.robot.max_speed,
+        gt=0,
+        description="[m] from scan to scan, where nothing else is known",
+    )
+    farthest: float = derived(
+        lambda c: 7.5 * c.robot.max_speed,
+        gt=0,
+        description="[m] it may have come, at the most: beyond, nothing is known",
+    )
+
+
+class Path(NamedTuple):
+    """The scans of a component.
+
+    Attributes
+    ----------
+    number, stamp, pose
+        (n,) their numbers, ascending, (n,) stamps [s], and (n, 3) poses in the component.
+    interval
+        The usual time from a scan to the next [s]; 0 where stamps do not tell.
+    """
+
+    number: IntArray
+    stamp: FloatArray
+    pose: FloatArray
+    interval: float
+
+    @classmethod
+    def of(cls, submaps: Sequence[Submap], component: int) -> Self:
+        """Return that of one of the components of `submaps`."""
+        inside = [s for s in submaps if s.component == component and len(s.trajectory.pose)]
+        number = np.concatenate([s.trajectory.scan_index for s in inside])
+        stamp = np.concatenate([s.trajectory.stamp for s in inside])
+        pose = np.concatenate([se2.compose(s.pose, s.trajectory.pose) for s in inside])
+        order = np.argsort(number, kind="stable")
+        number, stamp = number[order], stamp[order]
+        between = np.diff(stamp) / np.maximum(np.diff(number), 1)
+        told = between[np.isfinite(between)]
+        usual = max(float(np.median(told)), 0.0) if len(told) else 0.0
+        return cls(number, stamp, pose[order], usual)
+
+
+class _End(NamedTuple):
+    """A (3,) pose in the component, the (3,) pose of what was lost next to it, and how far apart.
+
+    At most `way` [m] and `turn` [rad] lie between them.
+    """
+
+    at: FloatArray
+    own: FloatArray
+    way: float
+    turn: float
+
+
+class Whereabouts:
+    """Where a robot can have been on a path that was `lost`, by the `known` one.
+
+    A pose is that of the lost path's frame in the known one's.
+    """
+
+    def __init__(self, lost: Path, known: Path, parameters: WhereaboutsParameters) -> None:
+        self._p = parameters
+        self._ends: list[_End] = []
+        first, last = (int(np.searchsorted(known.number, lost.number[k])) for k in (0, -1))
+        for theirs, own in ((first - 1, 0), (last, -1)):
+            if 0 <= theirs < len(known.number):
+                way, turn = self._most(lost, own, known, theirs)
+                if way <= parameters.farthest:
+                    self._ends.append(_End(known.pose[theirs], lost.pose[own], way, turn))
+
+    def mapped(self, known: Path) -> int:
+        """Return how many scans of the `known` path lie about there."""
+        near = np.zeros(len(known.pose), dtype=np.bool_)
+        for end in self._ends:
+            near |= np.hypot(*(known.pose - end.at)[:, :2].T) <= self._p.farthest
+        return int(near.sum())
+
+    def allows(self, transforms: FloatArray) -> BoolArray:
+        """(k,) by which of (k, 3) `transforms` it did not leap; by none where nothing is known."""
+        possible = np.full(len(transforms), bool(self._ends))
+        for end in self._ends:
+            x, y, turn = se2.between(end.at, se2.compose(transforms, end.own)).T
+            possible &= (np.hypot(x, y) <= end.way) & (np.abs(se2.wrap(turn)) <= end.turn)
+        return possible
+
+    def _most(self, lost: Path, own: int, known: Path, theirs: int) -> tuple[float, float]:
+        """How far [m] and turned [rad] it can have come from one scan to the other."""
+        p, scans = self._p, abs(int(lost.number[own] - known.number[theirs]))
+        way = p.slack + scans * _longer_step(known, p)
+        told = abs(float(lost.stamp[own] - known.stamp[theirs]))
+        time = max(known.interval * scans, told if math.isfinite(told) else 0.0)
+        if time <= 0:
+            return way, math.pi
+        return min(way, p.slack + p.max_speed * time), p.turn_slack + p.max_turn_rate * time
+
+
+def _longer_step(known: Path, p: WhereaboutsParameters) -> float:
+    """How far [m] a robot comes from scan to scan, when it comes far."""
+    follows = np.diff(known.number) == 1
+    if follows.sum() < p.few:
+        return p.untold
+    steps = np.hypot(*np.diff(known.pose[:, :2], axis=0)[follows].T)
+    return p.paced * float(np.quantile(steps, p.longer))
