@@ -18,6 +18,7 @@ from mapweave.mapping.localization.known_map import KnownMap
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.maps import LineMap
 from mapweave.matching.coarse_places import CoarseMap, CoarsePlaceParameters, coarse_places
+from mapweave.matching.common_lines import count_common_lines
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.hypotheses import HypothesisParameters, different
 from mapweave.matching.icp import IcpParameters, Target, align_all
@@ -59,6 +60,10 @@ class ScanFinderParameters(StageParameters):
     )
     least: float = Field(0.5, gt=0, le=1, description="worth of a place, in shares of the returns")
     least_wall: float = Field(2.0, gt=0, description="[m] of wall that the scan shows, in common")
+    least_held: float = Field(0.0, ge=0, description="[m] of it across the weakest direction")
+    held_share: float = Field(
+        0.0, ge=0, description="[m] of that, for what the place leaves unexplained, besides"
+    )
     lead: float = Field(0.03, gt=0, description="share of the returns before the next best place")
     lead_share: float = Field(
         0.3, ge=0, description="of what the place leaves unexplained, that it leads by besides"
@@ -68,12 +73,16 @@ class ScanFinderParameters(StageParameters):
 
 
 class ScanPlace(NamedTuple):
-    """Where a scan may be: in which component, its pose (3,) there, and what that is worth."""
+    """Where a scan may be: in which component, its pose (3,) there, and what that is worth.
+
+    Of the walls in `common` [m], `held` [m] hold the weakest direction.
+    """
 
     component: int
     pose: FloatArray
     worth: float
     common: float
+    held: float
 
 
 class SeenFrom(NamedTuple):
@@ -143,6 +152,16 @@ class ScanFinder:
         )
         return best if best is not None and self._is_proven(best, places, possible) else None
 
+    def common_lines(self, seen: Sequence[SeenFrom], first: ScanPlace) -> int:
+        """Return how many straight lines the map shares with one of some scans, at the most."""
+        p, known, found = self._p, self._known[first.component], 0
+        for each in (each for each in seen if len(each.scan.segments)):
+            lines = self._lines(each.scan)
+            at = se2.compose(first.pose, se2.between(seen[0].pose, each.pose))
+            fields = known.field, DistanceField.of(lines, p.raster)
+            found = max(found, count_common_lines(*fields, at, lines, p.verification))
+        return found
+
     def _is_proven(self, best: ScanPlace, places: list[ScanPlace], possible: BoolArray) -> bool:
         """Whether a place is worth much, and more than what may be instead."""
         p = self._p
@@ -154,7 +173,8 @@ class ScanFinder:
                 rival = max(rival, place.worth)
         lead = p.lead + p.lead_share * (1.0 - best.worth)
         least = max(p.least, rival + lead, elsewhere - p.lead)
-        return best.worth >= least and best.common >= p.least_wall
+        held = p.least_held + p.held_share * (1.0 - best.worth)
+        return best.worth >= least and best.common >= p.least_wall and best.held >= held
 
     def _places_of_first(self, seen: Sequence[SeenFrom], k: int) -> Iterable[ScanPlace]:
         """Yield where the first of some scans is by what number `k` proposes, worth to all."""
@@ -167,7 +187,7 @@ class ScanFinder:
                 worth += float(
                     self._shares(other.scan.oriented, known, at[None], self._p.roughly)[0]
                 )
-            yield ScanPlace(place.component, first, worth / len(seen), place.common)
+            yield ScanPlace(place.component, first, worth / len(seen), place.common, place.held)
 
     def _lines(self, seen: Observation) -> LineMap:
         """Return the scan as a line map in its own frame, with the free space that it saw."""
@@ -193,7 +213,8 @@ class ScanFinder:
                 verdict = verify(known.field, field, fit.pose, p.verification)
                 against = verdict.contradicted / max(verdict.common + verdict.contradicted, 1e-9)
                 share = float(self._shares(oriented, known, fit.pose[None], p.explained)[0])
-                yield ScanPlace(number, fit.pose, share - p.weight * against, verdict.common)
+                worth = share - p.weight * against
+                yield ScanPlace(number, fit.pose, worth, verdict.common, verdict.held)
 
     def _shares(
         self, oriented: OrientedPoints, known: _Known, poses: FloatArray, explained: float

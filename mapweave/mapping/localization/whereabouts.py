@@ -82,30 +82,41 @@ class Path(NamedTuple):
 class _End(NamedTuple):
     """A (3,) pose in the component, the (3,) pose of what was lost next to it, and how far apart.
 
-    At most `way` [m] and `turn` [rad] lie between them.
+    At most `way` [m] and `turn` [rad] lie between them, and `unseen` scans that are in no map.
     """
 
     at: FloatArray
     own: FloatArray
     way: float
     turn: float
+    unseen: int
 
 
 class Whereabouts:
     """Where a robot can have been on a path that was `lost`, by the `known` one.
 
-    A pose is that of the lost path's frame in the known one's.
+    A pose is that of the lost path's frame in the known one's. All scans that are in any map have
+    the numbers `mapped`.
     """
 
-    def __init__(self, lost: Path, known: Path, parameters: WhereaboutsParameters) -> None:
+    def __init__(
+        self, lost: Path, known: Path, mapped: IntArray, parameters: WhereaboutsParameters
+    ) -> None:
         self._p = parameters
         self._ends: list[_End] = []
         first, last = (int(np.searchsorted(known.number, lost.number[k])) for k in (0, -1))
         for theirs, own in ((first - 1, 0), (last, -1)):
             if 0 <= theirs < len(known.number):
                 way, turn = self._most(lost, own, known, theirs)
-                if way <= parameters.farthest:
-                    self._ends.append(_End(known.pose[theirs], lost.pose[own], way, turn))
+                numbers = sorted((int(known.number[theirs]), int(lost.number[own])))
+                seen = np.isin(np.arange(numbers[0] + 1, numbers[1]), mapped)
+                end = _End(known.pose[theirs], lost.pose[own], way, turn, int((~seen).sum()))
+                self._ends += [end] if way <= parameters.farthest else []
+
+    @property
+    def went_unseen(self) -> bool:
+        """Whether scans are in no map between it and all that is known: where it went, none saw."""
+        return all(end.unseen > 0 for end in self._ends)
 
     def mapped(self, known: Path) -> int:
         """Return how many scans of the `known` path lie about there."""

@@ -23,7 +23,7 @@ def lost_at(numbers: range, *, interval: float) -> Path:
 
 def allowed(known: Path, lost: Path, at: list[float]) -> list[bool]:
     """Return at which of `at` [m] along x it can have been."""
-    where = Whereabouts(lost, known, WhereaboutsParameters())
+    where = Whereabouts(lost, known, np.empty(0, dtype=np.int64), WhereaboutsParameters())
     poses: FloatArray = np.column_stack([at, np.zeros((len(at), 2))])
     return [bool(can) for can in where.allows(poses)]
 
@@ -53,9 +53,22 @@ def test_between_two_scans_that_are_known_it_is_near_both() -> None:
 def test_what_is_long_ago_tells_nothing() -> None:
     known, lost = path(range(20), 0.5, interval=0.1), lost_at(range(900, 901), interval=0.1)
     assert allowed(known, lost, [9.5]) == [False]
-    assert Whereabouts(lost, known, WhereaboutsParameters()).mapped(known) == 0
+    assert (
+        Whereabouts(lost, known, np.empty(0, dtype=np.int64), WhereaboutsParameters()).mapped(known)
+        == 0
+    )
 
 
 def test_what_is_mapped_about_there_is_counted() -> None:
     known, lost = path(range(101), 0.5, interval=0.1), lost_at(range(101, 102), interval=0.1)
-    assert Whereabouts(lost, known, WhereaboutsParameters()).mapped(known) == 31  # in 15 m
+    assert (
+        Whereabouts(lost, known, np.empty(0, dtype=np.int64), WhereaboutsParameters()).mapped(known)
+        == 31
+    )  # in 15 m
+
+
+@pytest.mark.parametrize(("others", "unseen"), [([20], True), ([20, 21], False)])
+def test_it_went_unseen_where_scans_between_are_in_no_map(others: list[int], unseen: bool) -> None:
+    known, lost = path(range(20), 0.5, interval=0.1), lost_at(range(22, 24), interval=0.1)
+    mapped = np.concatenate([known.number, lost.number, others])
+    assert Whereabouts(lost, known, mapped, WhereaboutsParameters()).went_unseen is unseen
