@@ -34,7 +34,7 @@ class PlaceIndexParameters(StageParameters):
     """How words are told apart, and how much is looked at.
 
     Chosen on submaps of `csail-thinned`, `fr079` and `seattle` in 6 stretches each, among 1000;
-    how many are voted and scored, on six logs in 4 and 7.
+    how many words are looked at and places voted and scored, on six logs in 3 to 8.
     """
 
     words: WordParameters = WordParameters()
@@ -45,10 +45,10 @@ class PlaceIndexParameters(StageParameters):
     turn_tolerance: float = Field(0.09, gt=0, description="[rad] between those: 5°")
     cell: float = Field(0.25, gt=0, description="[m] that votes are counted in, thrice as wide")
     cell_turns: int = Field(90, ge=3, description="of a turn, likewise: 4°")
-    budget: int = Field(12_000, ge=1, description="words alike that are looked at, the rarest")
-    voted: int = Field(400, ge=1, description="places that are looked at, the most voted")
-    stride: int = Field(4, ge=1, description="of the samples these are scored by at first")
-    scored: int = Field(40, ge=1, description="of them that are scored by all samples, the best")
+    budget: int = Field(8000, ge=1, description="words alike that are looked at, the rarest")
+    voted: int = Field(500, ge=1, description="places that are looked at, the most voted")
+    stride: int = Field(5, ge=1, description="of the samples these are scored by at first")
+    scored: int = Field(30, ge=1, description="of them that are scored by all samples, the best")
     distance: float = Field(0.35, gt=0, description="[m] between different places of one map")
     turn: float = Field(0.1, gt=0, description="[rad] between those: 6°")
     raster: DistanceFieldParameters = derived(

@@ -32,8 +32,8 @@ class WordParameters(BaseModel):
     min_length: float = Field(0.8, gt=0, description="[m] of a wall, for a direction worth using")
     max_walls: int = Field(200, ge=2, description="of a map, the longest")
     nearest: float = Field(0.7, gt=0, description="[m] between the ends of a word, at least")
-    farthest: float = Field(7.0, gt=0, lt=60, description="[m] between them, at most")
-    max_words: int = Field(1200, ge=1, description="of a map, those of the longest walls")
+    farthest: float = Field(8.0, gt=0, lt=60, description="[m] between them, at most")
+    max_words: int = Field(1000, ge=1, description="of a map, those of the longest walls")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -93,8 +93,8 @@ def test_bare_wings_of_which_a_door_is_elsewhere_are_of_one_kind() -> None:
 
 def told_at_a_place(here: LineMap, there: LineMap, dissimilar: float) -> bool:
     parameters = P.wings.model_copy(update={"dissimilar": dissimilar})
-    shapes = (prepared(with_walls(lines, THING)) for lines in (here, there))
-    return told_by_kind(*shapes, se2.IDENTITY, P.verification, parameters, rigid=False)
+    one, other = (prepared(with_walls(lines, THING)) for lines in (here, there))
+    return told_by_kind(one, other, se2.IDENTITY, P.verification, parameters, rigid=False)
 
 
 def test_bent_maps_are_dissimilar_where_much_wall_lies_across_passages_odd_things_or_not() -> None:
