@@ -95,7 +95,7 @@ fuzz: $(KERNELS)
 .PHONY: docs
 docs: $(KERNELS)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
-	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs/reference site
+	$(BIN)/sphinx-build --quiet --fresh-env --fail-on-warning --keep-going docs/reference site
 
 bench-map: $(KERNELS)
 	$(BIN)/python -m benchmarks map
