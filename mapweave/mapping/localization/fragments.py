@@ -28,7 +28,7 @@ class FragmentParameters(StageParameters):
     """What a fragment is, and how many are looked for."""
 
     # Nothing undoes a join: more is asked than of a robot that is only followed. On every third
-    # and fourth scan of four recordings no wrong place of 68 shows this, and 40 of 65 right ones.
+    # and fourth scan of four recordings no wrong place of 68 shows this, and 43 of 65 right ones.
     finder: ScanFinderParameters = derived(
         lambda c: ScanFinderParameters.of(
             c, least=0.6, least_wall=3.0, least_held=0.5, held_share=3.0
