@@ -22,6 +22,8 @@ from mapweave_protocol.wire.pairs import Run, is_older, ordered, responsible, ru
 
 PairOfRuns: TypeAlias = frozenset[Run]
 
+LOOKED_UP_AT_ONCE = 4  # submaps, some 4 ms each: scans wait meanwhile
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -158,8 +160,12 @@ class ComparisonSchedule:
 
         Those of runs that are over come last: what they are like does not change. Before them, and
         of each kind, those come first whose shapes speak for it; of several the one due longest.
+        As long as submaps wait to be looked up, what shapes speak for is not known: ask again.
         """
         if self._own is None or now < self._quiet_until:
+            return None
+        self._encounters.catch_up(LOOKED_UP_AT_ONCE)
+        if self._encounters.is_behind:
             return None
         ours = [(self._is_over(*pair), self._pair(*pair).rests_until, pair) for pair in self._ours]
         due = [(over, since, pair) for over, since, pair in ours if self._due(pair, since, now)]

@@ -86,6 +86,7 @@ def drive(team: Sequence[Member], costs: Costs) -> Driven:
         assert robot_map is not None  # nothing is lost
         with costs.of("its submap looked up"):
             encounters.take(robot_map)
+            encounters.catch_up()
         for run in encounters.likely_of(run_of(robot_map)):
             pair = min(place, places[run]), max(place, places[run])
             if now >= rests.get(pair, 0.0):

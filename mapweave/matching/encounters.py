@@ -1,7 +1,8 @@
 """Which robots have seen a place in common, by shape alone: whose maps are worth comparing.
 
-Every submap is looked up once, when it comes, among those of all other runs. So what a team pays
-grows with the submaps that there are, not with the pairs of maps.
+Every submap is looked up once among those of all other runs. So what a team pays grows with the
+submaps that there are, not with the pairs of maps. It is looked up when somebody wants to know, not
+when it comes: of one that grows meanwhile only the last state is.
 """
 
 from typing import TypeAlias
@@ -35,27 +36,39 @@ class EncounterParameters(StageParameters):
 
 
 class Encounters:
-    """What the submaps of a team say of each other, built as they come."""
+    """What the submaps of a team say of each other: what has been taken in and looked up."""
 
     def __init__(self, parameters: EncounterParameters | None = None) -> None:
         self._p = parameters or EncounterParameters.of(Config())
         self._index: PlaceIndex[Key] = PlaceIndex(self._p.index)
-        self._walls: dict[Key, float] = {}  # [m] when it was looked up
+        self._walls: dict[Key, float] = {}  # [m] when it was, or is to be, looked up
+        self._waiting: dict[Key, Submap] = {}
         self._best: dict[Run, dict[Run, float]] = {}  # both ways
 
     def take(self, robot_map: RobotMap) -> None:
-        """Take in a map; only what is new of it is looked up."""
+        """Take in a map; only what is new of it waits to be looked up."""
         run = robot_map.robot, robot_map.boot
         named = {(*run, submap.id): submap for submap in robot_map.submaps}
         for key in [k for k in self._walls if k[:2] == run and k not in named]:
             del self._walls[key]
+            self._waiting.pop(key, None)
             self._index.discard(key)
         for key, submap in named.items():
             wall = float(lengths(submap.map.segments).sum())
             known = self._walls.get(key, 0.0)
             if wall >= self._p.min_wall and not known <= wall < known * (1 + self._p.growth):
                 self._walls[key] = wall
-                self._look_up(key, submap)
+                self._waiting[key] = submap
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether anything that was taken in waits to be looked up."""
+        return bool(self._waiting)
+
+    def catch_up(self, most: int | None = None) -> None:
+        """Look up what waits, what waits longest first; no more than `most` submaps if told."""
+        for key in list(self._waiting)[:most]:
+            self._look_up(key, self._waiting.pop(key))
 
     def score(self, one: Run, other: Run) -> float:
         """[m] of the best place that two runs had in common; 0 without."""

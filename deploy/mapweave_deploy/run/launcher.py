@@ -32,6 +32,7 @@ from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
 ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things
 PAGE_PATIENCE = 60.0  # [s] for the coordinator to serve its page, while agents start as well
+AGENT_NICENESS = 7  # of agents, beside a router and a coordinator on the same machine
 POLL = 0.2  # [s] after which a dead process or the end is noticed
 CAPACITY = 100_000  # messages waiting to be counted
 
@@ -257,7 +258,8 @@ def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
     state = ["--state", str(plan.states / member.robot)]
     reach = [*plan.connection, *plan.proof(Role.ROBOT, member.robot)]
     arguments = ["agent", *source, *scans, *state, *reach, *plan.computing]
-    crew.start(f"agent {member.robot}", AGENT, arguments)
+    # On one machine all wait for the coordinator: robots' own computers do not compete with it.
+    crew.start(f"agent {member.robot}", AGENT, arguments, niceness=AGENT_NICENESS)
 
 
 def _listens(host: str, port: int) -> bool:

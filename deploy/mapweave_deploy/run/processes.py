@@ -78,8 +78,9 @@ class ProcessGroup:
         stage: int,
         arguments: Sequence[str],
         environment: Mapping[str, str] | None = None,
+        niceness: int = 0,
     ) -> Child:
-        """Start ``mapweave`` with `arguments` as a process of its own.
+        """Start ``mapweave`` with `arguments` as a process of its own, so much nicer than this one.
 
         It gets a process group of its own too: a Ctrl-C at the terminal reaches the launcher only,
         which stops the others in their order.
@@ -95,6 +96,9 @@ class ProcessGroup:
                 process_group=0,
                 env={**os.environ, **(environment or {})},
             )
+        if niceness:
+            own = os.getpriority(os.PRIO_PROCESS, 0)
+            os.setpriority(os.PRIO_PROCESS, process.pid, own + niceness)
         child = Child(name, stage, process, log)
         self.children.append(child)
         return child

@@ -62,6 +62,15 @@ def test_higher_stages_are_stopped_without_the_lower_ones(tmp_path: Path) -> Non
         crew.check()
 
 
+def test_who_is_nicer_gives_way_with_all_it_starts(tmp_path: Path) -> None:
+    with ProcessGroup(tmp_path) as crew:
+        child = crew.start("router", 0, ["router", "--listen", free_endpoint()], niceness=3)
+        until(lambda: "listening" in child.log.read_text())
+        threads = [int(each.name) for each in Path(f"/proc/{child.process.pid}/task").iterdir()]
+        nicer = os.getpriority(os.PRIO_PROCESS, 0) + 3
+        assert {os.getpriority(os.PRIO_PROCESS, thread) for thread in threads} == {nicer}
+
+
 def test_a_killed_process_is_told_by_its_name_and_signal(tmp_path: Path) -> None:
     with ProcessGroup(tmp_path) as crew:
         child = start_router(crew, "agent r2")
