@@ -52,6 +52,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "EncounterParameters": {},
     "FftCorrelationParameters": {"clearance": 0.5},
     "FittingParameters": {"tolerance": 0.09, "max_hole": 0.3},
+    "FragmentParameters": {},
     "FreeSpaceParameters": {"sight": 10.0, "margin": 0.15, "cell": 0.05, "simplification": 0.1},
     "FusionParameters": {},
     "HypothesisParameters": {},
@@ -116,6 +117,14 @@ MEASURED: dict[str, dict[str, object]] = {
     },
     "VerificationParameters": {"closeness": 0.25, "clearance": 0.3},
     "WallEndParameters": {"max_overhang": 0.12, "max_crossing": 0.1},
+    "WhereaboutsParameters": {
+        "max_speed": 2.0,
+        "max_turn_rate": math.pi,
+        "slack": 0.5,
+        "turn_slack": 0.26,
+        "untold": 3.0,
+        "farthest": 15.0,
+    },
 }
 
 

@@ -19,6 +19,7 @@ class Noted(ProcessGroup):
         super().__init__(logs)
         self.words: list[list[str]] = []
         self.told: list[dict[str, str]] = []
+        self.niceness: list[int] = []
 
     def start(  # type: ignore[override]  # nothing is started
         self,
@@ -26,10 +27,12 @@ class Noted(ProcessGroup):
         stage: int,
         arguments: Sequence[str],
         environment: Mapping[str, str] | None = None,
+        niceness: int = 0,
     ) -> None:
         """Note the words, and what only the process itself is told."""
         self.words.append([name, str(stage), *arguments])
         self.told.append(dict(environment or {}))
+        self.niceness.append(niceness)
 
 
 @pytest.mark.parametrize("config", [None, Path("robot.toml")])
@@ -43,6 +46,8 @@ def test_agents_and_coordinator_get_the_configuration_of_the_team(
     crew = Noted(tmp_path)
     start_server(crew, plan, plan.store)
     start_agent(crew, plan, member)
+    server, agent = crew.niceness
+    assert server < agent, "on one machine robots give way to whom all wait for"
     server, agent = crew.words
     assert (server[2], agent[2]) == ("server", "agent")
     for words in (server, agent):
