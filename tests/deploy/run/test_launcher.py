@@ -46,8 +46,8 @@ def test_agents_and_coordinator_get_the_configuration_of_the_team(
     crew = Noted(tmp_path)
     start_server(crew, plan, plan.store)
     start_agent(crew, plan, member)
-    server, agent = crew.niceness
-    assert server < agent, "on one machine robots give way to whom all wait for"
+    coordinator, robot = crew.niceness
+    assert coordinator < robot, "on one machine robots give way to whom all wait for"
     server, agent = crew.words
     assert (server[2], agent[2]) == ("server", "agent")
     for words in (server, agent):
