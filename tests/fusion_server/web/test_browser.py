@@ -481,6 +481,7 @@ def test_keys_move_zoom_and_turn_the_map_and_fit_it_again(
 ) -> None:
     page.publish(make_joint(1, lines, a=0.0))
     expect_version(seen.tab, 1)
+    expect(seen.tab.locator("#stale")).to_be_visible()  # of no coordinator: it takes its place
     fitted = until_still(seen.tab)
     seen.tab.locator("#map").focus()
     focused = until_still(seen.tab)
