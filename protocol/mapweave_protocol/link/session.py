@@ -18,6 +18,7 @@ import zenoh.ext as ze
 
 from mapweave_protocol.errors import EndpointError, NotEncryptedError, UnreachableError
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
+from mapweave_protocol.link.guard.deaf_link import mending_deaf_links
 from mapweave_protocol.link.reasons import reason_of
 from mapweave_protocol.link.security.access import access_rules, size_limits
 from mapweave_protocol.link.security.settings import LinkSettings
@@ -177,7 +178,10 @@ def open_session(
     link = LinkSettings.of_environment() if link is None else link
     encrypted = link.keys is not None
     addresses = default_endpoints(encrypted=encrypted) if endpoints is None else tuple(endpoints)
-    with _connect(addresses, mode, link, patience, on_wait) as session:
+    with (
+        _connect(addresses, mode, link, patience, on_wait) as session,
+        mending_deaf_links(session),
+    ):
         yield session
 
 

@@ -29,6 +29,7 @@ from mapweave_protocol.link.inbox import (
     Reader,
     alignment_reader,
     joint_reader,
+    joint_status_reader,
     map_reader,
     read_coordinator,
     read_presence,
@@ -44,11 +45,17 @@ from mapweave_protocol.wire.keys import (
     ALIGNMENT,
     COORDINATOR_LIVE,
     JOINT_MAP,
+    JOINT_STATUS,
     LIVE,
     MAP,
     STATUS,
 )
-from mapweave_protocol.wire.messages import JointMapMessage, MapMessage, StatusMessage
+from mapweave_protocol.wire.messages import (
+    JointMapMessage,
+    JointStatusMessage,
+    MapMessage,
+    StatusMessage,
+)
 from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.queries import JointQuery
 
@@ -56,7 +63,7 @@ KEPT_LINES = 20  # of the story stay on the terminal
 POLL = 0.5  # [s]
 ASKED_EVERY = 1.0  # [s] between two questions for a version that was missed, at the least
 MAX_ROBOTS = 64  # told of
-HISTORY = {MAP: MESSAGES_TO_COMPLETE, STATUS: 1, ALIGNMENT: 1, JOINT_MAP: 1}
+HISTORY = {MAP: MESSAGES_TO_COMPLETE, STATUS: 1, ALIGNMENT: 1, JOINT_MAP: 1, JOINT_STATUS: 1}
 
 M = TypeVar("M", bound=Message)
 Teller = Callable[[Arrival], Iterator[str]]
@@ -71,7 +78,8 @@ class Watcher:
     story
         What it knows.
     lacks_version
-        Whether the last version of the joint map said what changed of one that was missed.
+        Whether a version of the joint map was missed: what came says what changed of another one,
+        or the coordinator may have another one than was told.
     """
 
     def __init__(self) -> None:
@@ -89,6 +97,7 @@ class Watcher:
             _teller(map_reader(refusals), self._tell_map),
             _teller(alignment_reader(refusals), self.story.aligned),
             _teller(joint_reader(refusals), self.tell_joint),
+            _teller(joint_status_reader(refusals), self._expect),
         )
 
     def tell(self, arrival: Arrival) -> Iterator[str]:
@@ -108,6 +117,12 @@ class Watcher:
             joint = whole.unpack()
             yield from self.story.joined(joint)
             yield from self._coverage.changed(joint)
+
+    def _expect(self, message: JointStatusMessage) -> Iterator[str]:
+        # Nothing else tells of a last version that was lost while the link was down.
+        there = message.series, message.version
+        self.lacks_version |= message.version > 0 and self._told != there
+        yield from ()
 
     def _tell_status(self, message: StatusMessage) -> Iterator[str]:
         self._note(message.robot)
@@ -135,6 +150,7 @@ class Watcher:
         coordinator = read_coordinator(arrival, self._refusals)
         if coordinator is not None:
             boot, here = coordinator
+            self.lacks_version |= here  # it is seen again after an outage
             yield from self.story.coordinator(boot, here=here)
         if presence is not None:
             self._note(presence.robot)

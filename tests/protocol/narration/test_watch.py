@@ -27,6 +27,7 @@ from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
     JointMapMessage,
+    JointStatusMessage,
     MapMessage,
     MapVersion,
     StatusMessage,
@@ -130,6 +131,19 @@ def test_a_join_that_a_version_does_not_rely_on_is_told_once_with_the_reason() -
         "a/0 and b/0: alignment not relied on (9.0 m and 0° off what a/0-c/0 says; 40 m in common)",
         "a/0 and b/0: alignment revoked in version 3 (only 2.0 m of wall in common)",
     ]
+
+
+def test_a_version_that_only_the_coordinator_speaks_of_is_lacking_until_it_is_told(
+    random_joint: MakeJoint,
+) -> None:
+    watcher = Watcher()
+    said = JointStatusMessage(boot="c1", stamp=0.0, series="s1", version=4, pending=False)
+    list(watcher.tell(Arrival(keys.JOINT_STATUS.build(team="t"), encode(said))))
+    assert watcher.lacks_version
+    list(watcher.tell_joint(JointMapMessage.pack(random_joint(1, 4), "s1")))
+    assert not watcher.lacks_version
+    list(watcher.tell(Arrival(keys.JOINT_STATUS.build(team="t"), encode(said))))
+    assert not watcher.lacks_version
 
 
 def test_what_is_no_message_is_not_told() -> None:
