@@ -24,6 +24,7 @@ from benchmarks import (
     robots,
     same_results,
     shape,
+    sources,
     team,
     twins,
     usual_counts,
@@ -32,6 +33,7 @@ from benchmarks import (
 from benchmarks.faults import crowd, hostile, kills, lossy, outages, subscribers
 from benchmarks.scale import command as scale
 from benchmarks.speed import command as speed
+from mapweave.kernels.loading import missing
 
 
 class Benchmark(Protocol):
@@ -53,6 +55,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "localize": localize,
     "relocalize": relocalize,
     "live": live,
+    "sources": sources,
     "endurance": endurance,
     "fusion": fusion,
     "reference": reference,
@@ -84,6 +87,8 @@ def main() -> None:
     """Run the benchmark that was asked for, or the usual ones one after the other."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)  # whoever follows a file sees how far it is
+    if told := missing():
+        print(told)
     parser = _parser()
     asked = [sys.argv[1:]] if len(sys.argv) > 1 else [[name] for name in USUAL]
     if len(asked) > 1:

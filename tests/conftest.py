@@ -7,10 +7,17 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from mapweave.kernels.loading import missing
+
 settings.register_profile("busy", deadline=None)  # on a busy machine an example may take its time
 settings.load_profile("busy")
 
 DATA = Path(os.environ.get("MAPWEAVE_DATA", Path(__file__).parents[2] / "shared" / "data"))
+
+
+def pytest_report_header() -> list[str]:
+    """Say where tests of kernels are those of their twins."""
+    return [told] if (told := missing()) else []
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 import zenoh
 
@@ -133,6 +134,11 @@ class AgentRun:
     def finished(self) -> bool:
         """Whether all scans are mapped, and the last map is published."""
         return self._finished
+
+    @property
+    def robot_map(self) -> RobotMap:
+        """The map as it was published last, with the marks that the robot made."""
+        return replace(self._published, marks=self._marks.all)
 
     def mark(self, label: str, place: FloatArray, frame: Frame) -> str:
         """Mark a (2,) `place` [m] from any thread; as of `OwnMarks.add`."""

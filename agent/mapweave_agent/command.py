@@ -6,6 +6,7 @@ import math
 from functools import partial
 from pathlib import Path
 
+from mapweave.atomic import check_outputs
 from mapweave.cli import (
     Command,
     add_config_argument,
@@ -20,9 +21,11 @@ from mapweave.config import Config
 from mapweave.errors import UnusableOdometryError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
+from mapweave.io.map_files import save
 from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import ScanSource, open_source
+from mapweave.maps import RobotMap
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.live.ros2_output import output_of
@@ -112,6 +115,12 @@ def _add_what_is_told(parser: argparse.ArgumentParser) -> None:
 
 def _add_what_is_kept(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="MAP.json",
+        help="write the robot's map there when the agent ends, such as for --continue",
+    )
+    parser.add_argument(
         "--state",
         type=Path,
         metavar="DIR",
@@ -132,6 +141,8 @@ def _run(options: argparse.Namespace) -> int:
     team, endpoints, link = connection_of(options)
     check_member(link, Member(team, Role.ROBOT, robot))
     config = config_of(options)
+    stored = [path for path in (options.continued, options.localize) if path is not None]
+    check_outputs([options.output], stored)
     # Everything that can be wrong with the input is found before anybody hears of the robot.
     source = open_source(options.source, _read_options(options, config, endpoints))
     start = Start.of(options)
@@ -153,9 +164,20 @@ def _run(options: argparse.Namespace) -> int:
         run = AgentRun(
             session, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
         )
-        with spared():
-            _run_on(source, run, options)
+        try:
+            with spared():
+                _run_on(source, run, options)
+        finally:  # also where its source has failed
+            _write(run.robot_map, options.output)
     return 0
+
+
+def _write(robot_map: RobotMap, path: Path | None) -> None:
+    if path is not None and not robot_map.submaps:
+        _log.warning("%s is not written: nothing was mapped", path)
+    elif path is not None:
+        save(robot_map, path)
+        _log.info("the map is in %s", path)
 
 
 def _read_options(

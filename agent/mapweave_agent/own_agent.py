@@ -126,6 +126,11 @@ class Agent:
         """How many scans were fed and are still to be mapped; few, or the oldest is skipped."""
         return self._scans.waiting
 
+    @property
+    def robot_map(self) -> RobotMap:
+        """The robot's map as it was published last; after the block, all of it."""
+        return self._run.robot_map
+
     def feed(
         self,
         ranges: ArrayLike,

@@ -34,6 +34,7 @@ namespace nb = nanobind;
 
 NB_MODULE(_compiled, m) {
   m.doc() = "Compiled inner loops; see the modules beside for what they compute.";
+  m.def("sources", [] { return MAPWEAVE_SOURCES; });
   bind_clearing(m);
   bind_correlative(m);
   bind_denials(m);

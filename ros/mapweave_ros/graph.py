@@ -7,20 +7,21 @@ A token names a node, or a publisher or subscription of one::
 with ``%`` for every slash of a name.
 """
 
+import re
+
 import zenoh
 
-PUBLISHER = "MP"
-_TOKENS = "@ros2_lv/{domain}/*/*/*/MP/*/*/*/*/{dds_type}/*/*"
-_TOPIC = 9  # which part of a token
+_NUMBER = re.compile(r"[0-9]{1,3}")
+_TOKENS = "@ros2_lv/*/*/*/*/MP/*/*/*/*/{dds_type}/*/*"
+_DOMAIN, _TOPIC = 1, 9  # which parts of a token
 
 
-def topics_of_type(session: zenoh.Session, domain: int, dds_type: str, timeout: float) -> list[str]:
-    """Return the topics of `dds_type` that somebody publishes, in the order of their names.
+def topics_of_type(session: zenoh.Session, dds_type: str, timeout: float) -> list[tuple[int, str]]:
+    """Return domain and name of the topics of `dds_type` that somebody publishes, in their order.
 
     The bridge declares no tokens: its topics are not among them.
     """
-    tokens = session.liveliness().get(
-        _TOKENS.format(domain=domain, dds_type=dds_type), timeout=timeout
-    )
-    keys = [str(reply.ok.key_expr) for reply in tokens if reply.ok is not None]
-    return sorted({key.split("/")[_TOPIC].replace("%", "/") for key in keys})
+    tokens = session.liveliness().get(_TOKENS.format(dds_type=dds_type), timeout=timeout)
+    parts = [str(reply.ok.key_expr).split("/") for reply in tokens if reply.ok is not None]
+    named = [(part[_DOMAIN], part[_TOPIC].replace("%", "/")) for part in parts]
+    return sorted({(int(domain), topic) for domain, topic in named if _NUMBER.fullmatch(domain)})

@@ -9,7 +9,7 @@ import zenoh
 
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags.frames import TF_STATIC
-from mapweave.io.readers.ros_bags.laser_messages import UnreadableMessageError
+from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN, UnreadableMessageError
 from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
 from mapweave_protocol.link.inbox import Arrival, Inbox
@@ -17,14 +17,14 @@ from mapweave_ros.address import Laser, Ros2Address
 from mapweave_ros.graph import topics_of_type
 from mapweave_ros.output import open_when_there
 from mapweave_ros.refusals import Refusals
-from mapweave_ros.robot.beside_scans import BesideScans
+from mapweave_ros.robot.beside_scans import BesideScans, kind_of_odometry
 from mapweave_ros.robot.frames import RobotFrames
 from mapweave_ros.robot.several_lasers import SeveralLasers
 from mapweave_ros.scan_messages import ScanMessages
-from mapweave_ros.topics import DDS_LASER_SCAN, TopicKeys
+from mapweave_ros.silence import Expected, Silence
+from mapweave_ros.topics import TopicKeys, dds_type_of
 
 POLL = 0.1  # [s] after which it is noticed that nobody wants any more
-SILENT = 5.0  # [s] without a scan, after which it is said what else there is
 BEFORE = 0.3  # [s] for what is latched to come, before lasers are heard
 FORGOTTEN = 2.0  # [s] after which another publisher of a topic is listened to
 
@@ -94,7 +94,8 @@ class Ros2Source:
             self._hear_transforms(inbox, beside)
             for key in (key for topic in topics for key in topic.keys):
                 stack.enter_context(session.declare_subscriber(key, inbox.put))
-            heard = self._heard(session, inbox, topics, beside)
+            silence = self._silence(session)
+            heard = self._heard(inbox, topics, beside, silence)
             yield from self._combined(heard, beside)
 
     def _hear_transforms(self, inbox: Inbox, beside: BesideScans) -> None:
@@ -109,29 +110,36 @@ class Ros2Source:
     def _lasers(self) -> tuple[Laser, ...]:
         return self._address.lasers
 
+    def _silence(self, session: zenoh.Session) -> Silence:
+        """Return what tells which of the topics that were asked for nothing is heard of."""
+        expected = {laser.topic: Expected("scan", LASER_SCAN) for laser in self._lasers}
+        if self._odometry is not None:
+            expected[self._odometry] = Expected("odometry", kind_of_odometry(self._odometry))
+        return Silence(
+            expected,
+            self._address.network.domain,
+            lambda kind: topics_of_type(session, dds_type_of(kind), POLL),
+            self._tell,
+        )
+
     def _heard(
-        self,
-        session: zenoh.Session,
-        inbox: Inbox,
-        topics: list["_Topic"],
-        beside: BesideScans,
+        self, inbox: Inbox, topics: list["_Topic"], beside: BesideScans, silence: Silence
     ) -> Iterator[tuple[str, Mounting, Scan]]:
         """Yield the scans of each laser: its topic, where it sits, and what it measured."""
-        silent_at, scans = time.monotonic() + SILENT, 0
+        scans = 0
         while not self._closed.is_set():
             arrival = inbox.get(POLL)
+            silence.check()
             if arrival is None:
-                if time.monotonic() > silent_at:
-                    self._tell_silence(session)
-                    silent_at = float("inf")
                 continue
-            if beside.takes(arrival):
+            if (taken := beside.takes(arrival)) is not None:
+                silence.heard(taken)
                 continue
             topic = next(topic for topic in topics if topic.has(arrival))
+            silence.heard(topic.laser.topic)
             found = topic.scan(arrival, self._messages, scans)
             if found is None:
                 continue
-            silent_at = float("inf")
             mounting = self._mounting(topic, found[0], beside)
             if mounting is not None:
                 scans += 1
@@ -160,13 +168,6 @@ class Ros2Source:
             mountings[topic] = mounting
             for view in together.add(topic, scan):
                 yield beside.with_odometry(view, Mounting())
-
-    def _tell_silence(self, session: zenoh.Session) -> None:
-        there = topics_of_type(session, self._address.network.domain, DDS_LASER_SCAN, POLL)
-        asked = ", ".join(laser.topic for laser in self._lasers)
-        known = f"those announced are {', '.join(there)}" if there else "none is announced"
-        where = f"{asked} in domain {self._address.network.domain}"
-        self._tell(f"no scan yet at {where}; of topics with LaserScan {known}")
 
 
 class _Topic:

@@ -1,6 +1,7 @@
 """An agent that a program feeds, and one that lines on standard input do, around a real router."""
 
 import json
+import signal
 import subprocess
 import sys
 import threading
@@ -12,6 +13,7 @@ import pytest
 
 import mapweave_agent
 from mapweave.errors import ArgumentError, FileError, InvalidIdError
+from mapweave.io.map_files import read_map
 from mapweave.io.readers import read_scans
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
@@ -75,6 +77,34 @@ def test_lines_on_standard_input_are_mapped_as_their_log_is(
     assert listener.statuses["a"].scans_seen == SCANS
 
 
+def test_an_agent_that_is_interrupted_leaves_its_map_to_go_on_from(
+    endpoint: str, team: str, logs: list[Path], tmp_path: Path
+) -> None:
+    scans, file = scans_of(logs[0])[:60], tmp_path / "r1.json"
+    where = ["--robot", "a", "--team", team, "--connect", endpoint, "--source", "-"]
+    where += ["--rate", "max", "--output", str(file)]
+    with open_session([endpoint], patience=PATIENCE) as session:
+        listener = Listener(session, team)
+        with subprocess.Popen(
+            [MAPWEAVE, "agent", *where], stdin=subprocess.PIPE, text=True
+        ) as process:
+            assert process.stdin is not None
+            process.stdin.write("".join(f"{as_line(scan)}\n" for scan in scans))
+            process.stdin.flush()
+            listener.until(
+                lambda: "a" in listener.statuses and listener.statuses["a"].scans_seen >= 40
+            )
+            process.send_signal(signal.SIGINT)
+            assert process.wait(PATIENCE) == 0
+    left = read_map(file)
+    assert left.robot == "a"
+    assert sum(len(submap.trajectory.scan_index) for submap in left.submaps) >= 40
+    mapper = Mapper("a", known=left)
+    for scan in scans:
+        mapper.add(scan)
+    assert mapper.finish().components == [0]
+
+
 def test_what_is_wrong_with_standard_input_ends_the_agent_in_one_line(
     endpoint: str, team: str
 ) -> None:
@@ -106,6 +136,7 @@ def test_a_program_feeds_an_agent_and_its_map_is_complete_when_the_block_ends(
         listener.until(lambda: listener.finished("a"))
     assert agent.skipped == 0
     assert_mapped(listener.maps["a"], scans)
+    assert_mapped(agent.robot_map, scans)
 
 
 def test_a_program_is_told_where_its_robot_is_at_the_rate_of_its_scans(

@@ -20,7 +20,7 @@ TYPE = "sensor_msgs::msg::dds_::LaserScan_"
 HUMBLE_HASH = "TypeHashNotSupported"
 STORE = get_typestore(Stores.ROS2_JAZZY)
 JAZZY_HASH = STORE.hash_rihs01(LASER_SCAN)
-PATIENCE = 20.0  # [s]
+PATIENCE = 60.0  # [s] for what takes one on a quiet machine
 GID = bytes(range(16))
 
 

@@ -141,6 +141,25 @@ def test_odometry_on_the_same_network_goes_along_with_scans(endpoint: str, said:
     assert told == []
 
 
+def test_odometry_of_another_clock_is_told_of_once(endpoint: str) -> None:
+    name, number, told = topic(), domain(), list[str]()
+    with (
+        robot(endpoint, number, {"/odom": (ODOMETRY, False)}) as node,
+        laser(endpoint, native_key(name, domain=number)) as sensor,
+        taking(endpoint, f"ros2:{name}?domain={number}", told, "/odom") as taken,
+    ):
+        sensor.wait_for_listener()
+        for count in range(6):
+            node.put("/odom", cdr(odometry(50.0 + count, 0.0, 0.0, 0.0), ODOMETRY))
+        for count in range(120):
+            sensor.say(laser_scan(ROOM, -np.pi, STEP, 1e6 + count))
+        taken.wait(120)
+    assert told == [
+        "/odom does not say where the robot was when its scans were taken; expected poses in a"
+        " parent called odom, with stamps of the same clock"
+    ]
+
+
 def test_noise_where_transforms_and_odometry_are_said_is_refused(endpoint: str) -> None:
     name, number, told = topic(), domain(), list[str]()
     kinds = {"/tf_static": (TF_MESSAGE, False), "/odom": (ODOMETRY, False)}

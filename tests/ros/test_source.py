@@ -151,7 +151,7 @@ def test_a_topic_of_another_type_is_told_by_its_type(endpoint: str) -> None:
 def test_where_nothing_comes_the_lasers_that_there_are_are_named(
     endpoint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mapweave_ros.source.SILENT", 0.2)
+    monkeypatch.setattr("mapweave_ros.silence.SILENT", 0.2)
     told = list[str]()
     heard = threading.Event()
 

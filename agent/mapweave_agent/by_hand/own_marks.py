@@ -82,6 +82,12 @@ class OwnMarks:
             self._version += 1
 
     @property
+    def all(self) -> tuple[Mark, ...]:
+        """Those that were made and not taken back."""
+        with self._lock:
+            return tuple(self._marks.values())
+
+    @property
     def state(self) -> MapVersion | None:
         """Which version was published last; None where nothing was ever marked."""
         if not self._published:

@@ -38,19 +38,20 @@ class PairEvaluation:
     reference, other
         Component names.
     distance
-        By how much points on the path of `other` are displaced, at the median [m]; infinite where
-        the two cannot be joined because they are in different places.
+        By how much points on the path of `other` are displaced, at the median [m]; NaN where the
+        two are in different places: how these lie to each other is not known.
     angle
-        By how much it is turned [rad].
+        By how much it is turned [rad]; NaN likewise.
     right
-        Whether that is within the limits.
+        Whether that is within the limits; None where it cannot be known: two logs may be of one
+        building.
     """
 
     reference: str
     other: str
     distance: float
     angle: float
-    right: bool
+    right: bool | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +134,7 @@ def _compare(
     reference: PlacedRobot, other: PlacedRobot, limits: Limits
 ) -> Iterator[PairEvaluation]:
     if reference.place != other.place:
-        yield PairEvaluation(reference.name, other.name, np.inf, np.pi, right=False)
+        yield PairEvaluation(reference.name, other.name, np.nan, np.nan, right=None)
     elif reference.true is not None and other.true is not None:
         true = se2.between(reference.true, other.true)
         yield _compare_poses(reference, other, true, limits)

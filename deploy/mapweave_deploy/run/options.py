@@ -36,8 +36,8 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         type=Path,
         metavar="LOG",
-        help="recorded scans, cut into overlapping stretches, one a robot; several logs are of"
-        " different buildings",
+        help="recorded scans, cut into overlapping stretches, one a robot; several logs may be of"
+        " one building or of several",
     )
     parser.add_argument(
         "--world",

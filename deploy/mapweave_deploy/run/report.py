@@ -92,11 +92,11 @@ def tell_verdicts(
     yield from _tell_components(outcome, members, verdicts)
     for verdict in verdicts:
         yield f"  {verdict.reference} and {verdict.other}: {_tell_error(verdict)}"
-    if verdicts:
-        right = sum(verdict.right for verdict in verdicts)
+    judged = [verdict.right for verdict in verdicts if verdict.right is not None]
+    if judged:
         yield (
-            f"{right} of {len(verdicts)} joined pairs are right within {limits.distance:g} m and"
-            f" {np.degrees(limits.angle):g}° of {SIMULATED if simulated else LOGGED}."
+            f"{sum(judged)} of {len(judged)} joined pairs are right within {limits.distance:g} m"
+            f" and {np.degrees(limits.angle):g}° of {SIMULATED if simulated else LOGGED}."
         )
 
 
@@ -108,7 +108,7 @@ def _tell_components(
     homes = [c for c in outcome.joint.components if not mains.isdisjoint(c.robots)]
     yield f"{counted(len(members), 'robot')} in {counted(len(homes), 'component')}."
     places = len({member.place for member in members})
-    if places > 1 and not any(np.isinf(verdict.distance) for verdict in verdicts):
+    if places > 1 and all(verdict.right is not None for verdict in verdicts):
         yield f"Nothing is joined across the {places} logs."
     for component in outcome.joint.components:
         if mains.isdisjoint(component.robots):
@@ -125,8 +125,8 @@ def _tell_rest(component: JointComponent, outcome: TeamOutcome) -> str:
 
 
 def _tell_error(verdict: PairEvaluation) -> str:
-    if np.isinf(verdict.distance):
-        return "WRONG: they are in different places"
+    if verdict.right is None:
+        return "joined across logs, which is right only if these are of one building"
     error = f"off by {verdict.distance:.3f} m and {np.degrees(verdict.angle):.1f}°"
     return f"right, {error}" if verdict.right else f"WRONG, {error}"
 

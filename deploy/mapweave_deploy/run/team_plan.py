@@ -25,7 +25,8 @@ class Member:
     scans
         First and behind the last of them.
     place
-        Members with the same place can be joined rightly; others cannot.
+        Where the truth is given: in one log, or one world. How places lie to each other, nobody
+        knows.
     truth_index, truth_pose
         (m,) scan indices and (m, 3) where they were taken [m, m, rad]: simulated, or the poses
         in the log; none where they are not known.

@@ -29,6 +29,12 @@ from mapweave_ros.scan_messages import ScanMessages
 from mapweave_ros.topics import TopicKeys, dds_type_of
 
 REMEMBERED = 400  # poses of odometry: some seconds of it
+PATIENCE = 50  # scans in a row of which odometry says nothing
+
+
+def kind_of_odometry(topic: str) -> str:
+    """Return the type of the messages at a topic of odometry: transforms if it is called ``tf``."""
+    return TF_MESSAGE if topic.endswith(TF) else ODOMETRY
 
 
 class BesideScans:
@@ -63,9 +69,10 @@ class BesideScans:
         if frames.followed:
             self._heard[TF] = _Heard(TF, domain, TF_MESSAGE, tell)
         if odometry is not None:
-            kind = TF_MESSAGE if odometry.endswith(TF) else ODOMETRY
+            kind = kind_of_odometry(odometry)
             self._heard[odometry] = _Heard(odometry, domain, kind, tell)
         self._said: set[str] = set()
+        self._without = 0  # scans in a row, though odometry is heard
 
     def subscribe(
         self, session: zenoh.Session, put: Callable[[zenoh.Sample], None], stack: ExitStack
@@ -81,14 +88,14 @@ class BesideScans:
                 else:
                     stack.enter_context(session.declare_subscriber(key, put))
 
-    def takes(self, arrival: Arrival) -> bool:
-        """Take `arrival`, if it is of this; tell whether it was."""
+    def takes(self, arrival: Arrival) -> str | None:
+        """Take `arrival`, if it is of this; return its topic, None if it is not."""
         topic = next((t for t, heard in self._heard.items() if heard.has(arrival)), None)
         if topic is None:
-            return False
+            return None
         decoded = self._heard[topic].decoded(arrival, self._messages)
         if decoded is None:
-            return True
+            return topic
         if topic == TF_STATIC:
             self._frames.say_fixed(decoded)
         if topic == TF and self._frames.followed:
@@ -96,7 +103,7 @@ class BesideScans:
         if topic == self._asked:
             for stamp, pose in odometry_in(decoded):
                 self._track.add(stamp, pose)
-        return True
+        return topic
 
     def mounting(self, topic: str, frame: str) -> Mounting | None:
         """Return where a laser sits; None where it is not known, or not level."""
@@ -116,6 +123,12 @@ class BesideScans:
     def with_odometry(self, scan: Scan, mounting: Mounting) -> Scan:
         """Return `scan` with what odometry says of its moment, if it does."""
         robot = self._track.at(scan.stamp)
+        self._without = self._without + 1 if robot is None else 0
+        if self._asked is not None and self._without == PATIENCE:
+            self._tell_once(
+                f"{self._asked} does not say where the robot was when its scans were taken;"
+                " expected poses in a parent called odom, with stamps of the same clock"
+            )
         if robot is None:
             return scan
         return replace(scan, odometry=se2.compose(robot, [mounting.x, mounting.y, 0.0]))
