@@ -7,6 +7,7 @@ import time
 from typing import Protocol
 
 from benchmarks import (
+    across,
     day,
     endurance,
     figure2,
@@ -55,6 +56,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "live": live,
     "endurance": endurance,
     "fusion": fusion,
+    "across": across,
     "reference": reference,
     "robots": robots,
     "peers": peers,

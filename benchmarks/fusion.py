@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> None:
         print(_tell_maps(stretches, count))
         chosen = choose_pairs(stretches, options.across, options.seed)
         pairs += [compare(a, b, parameters) for a, b in track(chosen, "comparing")]
-        write_json(options.output, [row for pair in pairs for row in _rows(pair)])
+        write_json(options.output, [row for pair in pairs for row in outcome_rows(pair)])
     print(tell(pairs))
     print(f"All comparisons are in {options.output}")
     if options.peers:
@@ -158,7 +158,7 @@ def _time_row(size: str, joined: str, pairs: Sequence[Pair]) -> list[str]:
     return [size, joined, str(len(pairs)), f"{median:.0f}", f"{most:.0f}"]
 
 
-def _rows(pair: Pair) -> list[dict[str, object]]:
+def outcome_rows(pair: Pair) -> list[dict[str, object]]:
     """Return a row for each match: the pair, the alignment, how far off it is."""
     names = (field.name for field in fields(pair) if field.name != "matches")
     whole = {name: getattr(pair, name) for name in names}
