@@ -8,6 +8,7 @@ from typing import Protocol
 
 from benchmarks import (
     across,
+    background,
     day,
     endurance,
     figure2,
@@ -57,6 +58,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "endurance": endurance,
     "fusion": fusion,
     "across": across,
+    "background": background,
     "reference": reference,
     "robots": robots,
     "peers": peers,

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 from typing import Literal
 
@@ -105,7 +106,12 @@ def choose_pairs(
 
 
 def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None = None) -> Pair:
-    """Align the maps of two stretches as robots do, and judge what comes of it."""
+    """Align the maps of two stretches as robots do, and judge what comes of it.
+
+    What is known of how rare shapes are is of other buildings.
+    """
+    known = tuple(sorted({first.log.building, second.log.building}))
+    parameters = without_buildings(parameters or FusionParameters(), known)
     start = time.perf_counter()
     alignments = align(first.robot_map, second.robot_map, parameters)
     seconds = time.perf_counter() - start
@@ -118,6 +124,15 @@ def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None
         tuple(judge(first, second, alignment) for alignment in alignments),
         seconds,
     )
+
+
+@lru_cache(64)
+def without_buildings(parameters: FusionParameters, buildings: tuple[str, ...]) -> FusionParameters:
+    """Return `parameters` whose background of shapes never saw `buildings`."""
+    asked = parameters.hypotheses
+    rarity = asked.rarity.model_copy(update={"left_out": buildings})
+    hypotheses = asked.model_copy(update={"rarity": rarity})
+    return parameters.model_copy(update={"hypotheses": hypotheses})
 
 
 def is_right(distance: float, turn: float) -> bool:

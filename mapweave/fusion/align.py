@@ -21,7 +21,7 @@ from mapweave.fusion.extrapolation import holds, reach
 from mapweave.fusion.mirrored import if_mirrored, told_if_mirrored, unless_mirrored
 from mapweave.fusion.parameters import FusionParameters, chosen
 from mapweave.fusion.places import compare_at_places, is_one_place, located
-from mapweave.fusion.ranking import Fields, find_alignments
+from mapweave.fusion.ranking import Fields, find_alignments, rated
 from mapweave.fusion.rivals import without_its_room
 from mapweave.fusion.rooms import outside
 from mapweave.fusion.wings import unless_one_kind
@@ -29,7 +29,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
-from mapweave.maps import Alignment, LineMap, RobotMap
+from mapweave.maps import Alignment, Decision, LineMap, RobotMap
 from mapweave.matching.coarse_places import coarse_places
 from mapweave.matching.hypotheses import (
     PreparedMap,
@@ -214,7 +214,7 @@ def compare(
             return found
         possible = propose_all(first, second, shifted, p.hypotheses)
     ranked = find_alignments(first, second, p, possible)
-    return _decided(a, b, ranked, (first.raster, second.raster), p)
+    return _decided(a, first, b, second, ranked, p)
 
 
 def _told_coarsely(
@@ -232,13 +232,13 @@ def _told_coarsely(
     middle = fields[1].oriented.points.mean(axis=0)
     leaders = different(places.aligned, places.scores, middle, p.hypotheses)[:2]
     if places.scores.max() < p.decision.min_common:
-        found = _decided(a, b, _as_hypotheses(places.aligned[leaders], fields, p), fields, p)
+        found = _decided(a, first, b, second, _as_hypotheses(places.aligned[leaders], fields, p), p)
         return found if found.decision == "refused" else None
     weight, least = p.verification.contradiction_weight, p.decision.min_confidence
     if may_be(places.scores[leaders].tolist(), weight, p.confidence) < least:
         return None
     ranked = find_alignments(first, second, p, places.shifted)
-    found = _decided(a, b, ranked, (first.raster, second.raster), p)
+    found = _decided(a, first, b, second, ranked, p)
     return found if found.decision == "accepted" else None
 
 
@@ -263,12 +263,17 @@ def _by_walls(
     if may_be(scores[leaders[:2]].tolist(), weight, p.confidence) < least:
         return None, shifted
     ranked = find_alignments(first, second, p, shifted)
-    found = _decided(a, b, ranked, (first.raster, second.raster), p)
+    found = _decided(a, first, b, second, ranked, p)
     return found if found.decision == "accepted" else None, shifted
 
 
 def _decided(
-    a: str, b: str, ranked: Sequence[Hypothesis], fields: Fields, p: FusionParameters
+    a: str,
+    first: PreparedMap,
+    b: str,
+    second: PreparedMap,
+    ranked: Sequence[Hypothesis],
+    p: FusionParameters,
 ) -> Alignment:
     """Return the alignment that the best of hypotheses is, and what is decided about it."""
     if not ranked:
@@ -276,19 +281,29 @@ def _decided(
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
     decision, cause = decide(best, rival, sure, p.decision)
-    if decision != "refused":  # whichever room it is
-        beyond = outside(*fields, best.transform, p.verification, p.rooms)
-        one_room = beyond < p.rooms.min_outside
-        asked = p.verification, p.rooms, p.wings.crossings
-        counted = without_its_room(best, rival, beyond, fields, *asked)
-        sure = confidence(best.verdict, counted.verdict if counted else None, p.confidence)
-        sure *= p.rooms.unique if one_room else 1.0
-        little = beyond if one_room else None
-        decision, cause = decide(best, counted, sure, p.decision, little)
+    if decision != "refused":
+        best = rated(best, first, second, p)
+        rival = rival and rated(rival, first, second, p)
+        decision, sure, cause = _whichever_room(best, rival, (first.raster, second.raster), p)
     if decision == "refused" or cause.kind is ReasonKind.RIVAL:
         sure = min(sure, p.rooms.unique)
     other = None if rival is None else runner_up(best, rival)
     return Alignment(a, b, best.transform, decision, sure, cause, evidence(best), other)
+
+
+def _whichever_room(
+    best: Hypothesis, rival: Hypothesis | None, fields: Fields, p: FusionParameters
+) -> tuple[Decision, float, Reason]:
+    """Decide about what is not refused, how sure it is, and why: rooms may exist twice."""
+    beyond = outside(*fields, best.transform, p.verification, p.rooms)
+    one_room = beyond < p.rooms.min_outside
+    asked = p.verification, p.rooms, p.wings.crossings
+    counted = without_its_room(best, rival, beyond, fields, *asked)
+    against = counted.verdict if counted else None
+    sure = confidence(best.verdict, against, p.confidence, best.rarity or 0.0)
+    sure *= p.rooms.unique if one_room else 1.0
+    decision, cause = decide(best, counted, sure, p.decision, beyond if one_room else None)
+    return decision, sure, cause
 
 
 def _no_alignment(a: str, b: str, cause: Reason) -> Alignment:

@@ -4,6 +4,8 @@ A proposal is not taken or left, one after the other, as the paper prints it: th
 whether the best is ambiguous.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from mapweave.fusion.decision import Hypothesis
@@ -15,6 +17,8 @@ from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import PreparedMap, different, hypothesise
 from mapweave.matching.icp import Target, align_all
 from mapweave.matching.verification import shared_complexity, verify
+from mapweave.shape.background import shares_without
+from mapweave.shape.rarity import rarity, shared_ends
 
 Fields = tuple[DistanceField, DistanceField]  # judged by: of the reference, and of the other
 
@@ -47,6 +51,17 @@ def _ranked(
         )
         for k in ranked[:2]
     ]
+
+
+def rated(
+    hypothesis: Hypothesis, first: PreparedMap, second: PreparedMap, p: FusionParameters
+) -> Hypothesis:
+    """Return `hypothesis` with how rare it is that two places have what both maps have (H1)."""
+    asked = p.hypotheses.rarity
+    shared = shared_ends(first.ends, second.ends, hypothesis.transform, asked)
+    shares = shares_without(asked.left_out, asked.bins)
+    bits = rarity(shared, shares, first.words.plus(second.words), asked)
+    return replace(hypothesis, rarity=bits)
 
 
 def _refined(
