@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks.ablation import Aligning
 from benchmarks.meetings import meeting_error
 from benchmarks.stretches import Stretch, alignment_error, common
 from mapweave.fusion.align import FusionParameters, align
@@ -105,7 +106,12 @@ def choose_pairs(
     return within + across
 
 
-def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None = None) -> Pair:
+def compare(
+    first: Stretch,
+    second: Stretch,
+    parameters: FusionParameters | None = None,
+    aligning: Aligning = align,
+) -> Pair:
     """Align the maps of two stretches as robots do, and judge what comes of it.
 
     What is known of how rare shapes are is of other buildings.
@@ -113,7 +119,7 @@ def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None
     known = tuple(sorted({first.log.building, second.log.building}))
     parameters = without_buildings(parameters or FusionParameters(), known)
     start = time.perf_counter()
-    alignments = align(first.robot_map, second.robot_map, parameters)
+    alignments = aligning(first.robot_map, second.robot_map, parameters)
     seconds = time.perf_counter() - start
     return Pair(
         first.name,
