@@ -114,6 +114,11 @@ bench-shape: $(KERNELS)
 	$(BIN)/python -m benchmarks shape --stretches 3 6
 	$(BIN)/python -m benchmarks scale
 
+# Which shapes buildings are full of, counted anew in all recordings.
+.PHONY: background
+background: $(KERNELS)
+	$(BIN)/python -m benchmarks background
+
 bench-fusion: $(KERNELS)
 	$(BIN)/python -m benchmarks fusion
 

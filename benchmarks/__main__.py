@@ -7,6 +7,8 @@ import time
 from typing import Protocol
 
 from benchmarks import (
+    across,
+    background,
     day,
     endurance,
     figure2,
@@ -58,6 +60,8 @@ BENCHMARKS: dict[str, Benchmark] = {
     "sources": sources,
     "endurance": endurance,
     "fusion": fusion,
+    "across": across,
+    "background": background,
     "reference": reference,
     "robots": robots,
     "peers": peers,

@@ -34,7 +34,7 @@ from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.matching.verification import Verdict
 
 MAX_BEND = 0.5  # [m] rms of the maps that the model is fitted to
-NAMES = ("score", "held", "overlap", "lead")  # of the slopes, as in `features`
+NAMES = ("score", "held", "overlap", "lead", "rarity")  # of the slopes, as in `features`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +118,7 @@ def read_examples(file: Path) -> Examples:
     rows = [row for row in json.loads(file.read_text()) if row["evidence"]]
     verdicts = [_verdicts(row) for row in rows]
     return Examples(
-        np.array([features(*pair) for pair in verdicts]),
+        np.array([features(*pair, _rarity(row)) for pair, row in zip(verdicts, rows, strict=True)]),
         np.array([share(*pair, ConfidenceParameters()) for pair in verdicts]),
         np.array([_number(row["evidence"].get("reach")) for row in rows]),
         np.array([_number(row["whole"]) for row in rows]),
@@ -128,6 +128,11 @@ def read_examples(file: Path) -> Examples:
         np.array([max(row["bends"]) for row in rows]),
         [(row["buildings"][0], row["buildings"][1]) for row in rows],
     )
+
+
+def _rarity(row: dict[str, Any]) -> float:
+    """[bits] 0 where it was not asked for: what is refused."""
+    return float(row["evidence"].get("rarity") or 0.0)
 
 
 def _number(value: float | None) -> float:

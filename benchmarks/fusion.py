@@ -13,20 +13,18 @@ from typing import get_args
 import numpy as np
 
 from benchmarks import peers
+from benchmarks.ablation import WITHOUT, aligning_without, parameters_without
 from benchmarks.logs import find_logs
 from benchmarks.pairs import Match, Outcome, Pair, choose_pairs, compare
 from benchmarks.stretches import Stretch, map_stretches
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.commands.progress import track
 from mapweave.evidence import RunnerUp
-from mapweave.fusion.align import FusionParameters
 
 ROWS = OUTPUT / "fusion.json"
 BENT = 0.3  # [m] rms from which on a map is named as bent
 GROUPS = (50.0, 30.0, 15.0, 5.0, 0.0)  # [m] in common, at least
 SIZES = (0, 100, 150, 300, 500)  # segments of the larger map, at least
-NEVER = 1e9  # [m] that no place scores, no wall has
-WITHOUT = ("words", "similarity")
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 
@@ -46,8 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--without",
         choices=WITHOUT,
-        help="leave out the places that shape words propose, or that what is dissimilar where maps"
-        " are aligned counts against them",
+        help="leave out shape words (the places that they propose, and how rare shapes are),"
+        " correlation (so that words alone propose), or that what is dissimilar where maps are"
+        " aligned counts against them",
     )
     parser.add_argument("--output", type=Path, default=ROWS, help="rows as JSON (%(default)s)")
 
@@ -56,28 +55,18 @@ def run(options: argparse.Namespace) -> None:
     """Compare all pairs, print the tables and every wrong join, write the rows."""
     pairs: list[Pair] = []
     logs, parameters = find_logs(options.logs), parameters_without(options.without)
+    aligning = aligning_without(options.without)
     for count in options.stretches:
         stretches = [stretch for log in logs for stretch in map_stretches(log, count)]
         print(_tell_maps(stretches, count))
         chosen = choose_pairs(stretches, options.across, options.seed)
-        pairs += [compare(a, b, parameters) for a, b in track(chosen, "comparing")]
-        write_json(options.output, [row for pair in pairs for row in _rows(pair)])
+        pairs += [compare(a, b, parameters, aligning) for a, b in track(chosen, "comparing")]
+        write_json(options.output, [row for pair in pairs for row in outcome_rows(pair)])
     print(tell(pairs))
     print(f"All comparisons are in {options.output}")
     if options.peers:
         rows = options.output.with_stem(f"{options.output.stem}-peers")
         print(peers.tell_beside(pairs, logs, options.stretches, rows))
-
-
-def parameters_without(what: str | None) -> FusionParameters:
-    """Return the default parameters, or those with a part of `WITHOUT` left out."""
-    p = FusionParameters()
-    if what == "words":
-        return p.model_copy(update={"places": p.places.model_copy(update={"min_score": NEVER})})
-    if what == "similarity":
-        crossings = p.wings.crossings.model_copy(update={"door": NEVER})
-        return p.model_copy(update={"wings": p.wings.model_copy(update={"crossings": crossings})})
-    return p
 
 
 def _tell_maps(stretches: Sequence[Stretch], count: int) -> str:
@@ -158,7 +147,7 @@ def _time_row(size: str, joined: str, pairs: Sequence[Pair]) -> list[str]:
     return [size, joined, str(len(pairs)), f"{median:.0f}", f"{most:.0f}"]
 
 
-def _rows(pair: Pair) -> list[dict[str, object]]:
+def outcome_rows(pair: Pair) -> list[dict[str, object]]:
     """Return a row for each match: the pair, the alignment, how far off it is."""
     names = (field.name for field in fields(pair) if field.name != "matches")
     whole = {name: getattr(pair, name) for name in names}

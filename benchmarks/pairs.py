@@ -4,11 +4,13 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
+from benchmarks.ablation import Aligning
 from benchmarks.meetings import meeting_error
 from benchmarks.stretches import Stretch, alignment_error, common
 from mapweave.fusion.align import FusionParameters, align
@@ -104,10 +106,20 @@ def choose_pairs(
     return within + across
 
 
-def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None = None) -> Pair:
-    """Align the maps of two stretches as robots do, and judge what comes of it."""
+def compare(
+    first: Stretch,
+    second: Stretch,
+    parameters: FusionParameters | None = None,
+    aligning: Aligning = align,
+) -> Pair:
+    """Align the maps of two stretches as robots do, and judge what comes of it.
+
+    What is known of how rare shapes are is of other buildings.
+    """
+    known = tuple(sorted({first.log.building, second.log.building}))
+    parameters = without_buildings(parameters or FusionParameters(), known)
     start = time.perf_counter()
-    alignments = align(first.robot_map, second.robot_map, parameters)
+    alignments = aligning(first.robot_map, second.robot_map, parameters)
     seconds = time.perf_counter() - start
     return Pair(
         first.name,
@@ -118,6 +130,15 @@ def compare(first: Stretch, second: Stretch, parameters: FusionParameters | None
         tuple(judge(first, second, alignment) for alignment in alignments),
         seconds,
     )
+
+
+@lru_cache(64)
+def without_buildings(parameters: FusionParameters, buildings: tuple[str, ...]) -> FusionParameters:
+    """Return `parameters` whose background of shapes never saw `buildings`."""
+    asked = parameters.hypotheses
+    rarity = asked.rarity.model_copy(update={"left_out": buildings})
+    hypotheses = asked.model_copy(update={"rarity": rarity})
+    return parameters.model_copy(update={"hypotheses": hypotheses})
 
 
 def is_right(distance: float, turn: float) -> bool:

@@ -46,13 +46,13 @@ def map_remembered(name: str, log: Path, scans: Sequence[Scan], robot: str) -> R
 def _fingerprint(log: Path, scans: Sequence[Scan], robot: str) -> str:
     """Name what a map depends on: the sources, the log, the scans, the robot's name."""
     digest = hashlib.sha256(f"{robot} {scans[0].index} {scans[-1].index} {len(scans)}".encode())
-    digest.update(_sources())
+    digest.update(sources())
     digest.update(log.read_bytes())
     return digest.hexdigest()[:24]
 
 
 @cache
-def _sources() -> bytes:
+def sources() -> bytes:
     """Return a digest of mapweave's sources, once: those that this process runs."""
     digest = hashlib.sha256()
     package = Path(mapweave.__file__).parent

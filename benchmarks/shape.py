@@ -9,6 +9,7 @@ import time
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations, islice
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,11 @@ from benchmarks.scale.made_up import robots_of
 from benchmarks.stretches import map_stretches
 from benchmarks.tables import OUTPUT, format_table, write_json
 from benchmarks.truth import Path2D, true_frame
+from mapweave.fusion.align import FusionParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Submap
+from mapweave.matching.coarse_places import CoarseMap, coarse_places
 from mapweave.matching.place_index import Place, PlaceIndex, PlaceShape
 from mapweave.scan.points import points_on_lines
 
@@ -32,6 +35,7 @@ FIRST = 5  # places that are looked at
 SPACING, NEAR = 0.15, 0.25  # [m] of points on walls; within which they are in common
 FOUND = 0.95  # of the submaps, among the first
 QUERY = ((1000, 2.0), (10_000, 4.0))  # submaps in the index, at most; [ms] of a query
+CORRELATED = 100  # pairs of submaps, for how long correlation takes
 ROBOTS = 4  # in a building that is made up
 Key = tuple[str, int, int]  # building, stretch, number among all
 
@@ -89,7 +93,7 @@ def run(options: argparse.Namespace) -> None:
     write_json(options.output, rows)
     print(tell(rows))
     lines, short = against_bars(rows, options.submaps)
-    print("\n".join(lines))
+    print("\n".join([*lines, without_words(rows, correlation_time(logs[0].name, options))]))
     if short:
         raise SystemExit(1)
 
@@ -105,6 +109,41 @@ def against_bars(rows: Sequence[dict[str, object]], submaps: int) -> tuple[list[
         f"among the first {FIRST}: {found:.1%}, to reach {FOUND:.0%}: {told[0]}",
         f"a query, median: {took:.1f} ms, to reach {most:g} ms: {told[1]}",
     ], any(missed)
+
+
+def correlation_time(name: str, options: argparse.Namespace) -> float:
+    """[ms] of processor time that looking for one submap in another takes without words."""
+    p = FusionParameters()
+    asked = p.hypotheses.coarse, p.verification
+    submaps = [
+        s
+        for m in map_stretches(find_logs([name])[0], options.stretches[0])
+        for s in m.robot_map.submaps
+    ]
+    shapes = [CoarseMap.of(s.map, *asked) for s in submaps if len(s.map.segments) > 2]
+    took = []
+    for one, other in islice(combinations(shapes, 2), CORRELATED):
+        start = time.process_time()
+        coarse_places(one, other, *asked)
+        took.append(time.process_time() - start)
+    return 1000 * float(np.median(took))
+
+
+def without_words(rows: Sequence[dict[str, object]], milliseconds: float) -> str:
+    """Return what would be found at most without words, at the cost of looking words up.
+
+    Submaps are drawn, as many as can be looked at in that time, and what is looked at is found if
+    it is there.
+    """
+    shares = []
+    for row in rows:
+        took, right, among = (float(str(row[k])) for k in ("milliseconds", "right", "submaps"))
+        looked_at = max(took / milliseconds, 1.0)
+        shares.append(1 - (1 - min(looked_at / among, 1.0)) ** right)
+    return (
+        f"without words, by correlation of submaps drawn at that cost ({milliseconds:.1f} ms each):"
+        f" {np.mean(shares):.1%} at most"
+    )
 
 
 def _fillers(count: int, index: PlaceIndex[Key]) -> list[tuple[Key, PlaceShape]]:
@@ -166,18 +205,18 @@ def _look_up(
         index.add(key, shape, key[:2])
     rows = []
     for sample in own:
-        shared = _most_shared(sample, own)
-        if shared >= SHARED:
+        shared = _shared_with(sample, own)
+        if shared.max(initial=0.0) >= SHARED:
             rows.append(_row(sample, shared, index, known))
     return rows
 
 
-def _most_shared(sample: Sample, own: Sequence[Sample]) -> float:
-    """[m] of wall in common with that submap of another stretch that shares most."""
+def _shared_with(sample: Sample, own: Sequence[Sample]) -> FloatArray:
+    """(n,) [m] of wall in common with each submap of another stretch."""
     if not np.isfinite(sample.frame[0]):
-        return 0.0
+        return np.empty(0)
     others = [s for s in own if s.key[1] != sample.key[1] and np.isfinite(s.frame[0])]
-    return max((_shared(sample.walls, s.walls) for s in others), default=0.0)
+    return np.array([_shared(sample.walls, s.walls) for s in others])
 
 
 def _shared(first: FloatArray, second: FloatArray) -> float:
@@ -190,7 +229,7 @@ def _shared(first: FloatArray, second: FloatArray) -> float:
 
 
 def _row(
-    sample: Sample, shared: float, index: PlaceIndex[Key], known: dict[Key, Sample]
+    sample: Sample, shared: FloatArray, index: PlaceIndex[Key], known: dict[Key, Sample]
 ) -> dict[str, object]:
     """Look a submap up in all but those of its own stretch."""
     building, stretch, _ = sample.key
@@ -201,7 +240,8 @@ def _row(
     rank = right.index(True) if True in right else None
     return {
         "log": sample.log,
-        "shared": shared,
+        "shared": float(shared.max()),
+        "right": int((shared >= SHARED).sum()),
         "rank": rank,
         "milliseconds": 1000 * took,
         "submaps": len(index),

@@ -31,7 +31,8 @@ from mapweave.text import percent
 FALSE_CONFIDENCE = 0.99  # the surest there is
 LEAST_ERROR = 2.0  # [m] that a false alignment is off
 SAME_POSE = 1e-3  # [m, rad]
-HEAD = ["log", "joined", "confidence", "worst pose", "woven", "injected", "held", "undecided"]
+HEAD = ["log", "joined", "confidence", "worst pose", "woven"]
+TRIALS = ("injected", "held", "undecided")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robots", type=int, default=8, metavar="N", help="stretches a log (8)")
     parser.add_argument("--trials", type=int, default=20, metavar="N", help="injections (20)")
     parser.add_argument(
-        "--agreeing", type=int, default=1, metavar="N", help="injected at once that agree (1)"
+        "--agreeing",
+        type=int,
+        nargs="+",
+        default=[1, 2, 3],
+        metavar="N",
+        help="injected at once that agree, each as often (1 2 3)",
     )
     parser.add_argument("--seed", type=int, default=1, help="draws what is injected (1)")
 
@@ -110,17 +116,15 @@ def run(options: argparse.Namespace) -> None:
         team = Team.of(map_stretches(log, options.robots))
         clusters, judged = team.join(team.alignments)
         woven = team.weave(clusters[0], judged)
-        rows.append(
-            [log.name, *_tell_clusters(team, clusters, woven), *_tell_trials(team, options)]
-        )
+        trials = [tell for n in options.agreeing for tell in _tell_trials(team, n, options)]
+        rows.append([log.name, *_tell_clusters(team, clusters, woven), *trials])
         for alignment in judged:
             if _is_set_aside(alignment):
                 print(f"  {alignment.reference} - {alignment.other}: {alignment.reason}")
-    print(format_table(HEAD, rows))
+    print(format_table(HEAD + [f"{n} {what}" for n in options.agreeing for what in TRIALS], rows))
     print(
-        f"injected: {options.agreeing} false at once, that agree, where more ways than these join"
-        " the ends of each without them; held: all set aside, named, poses as without them;"
-        " undecided: others"
+        "injected: so many false at once, that agree, where more ways than these join the ends of"
+        " each without them; held: all set aside, named, poses as without them; undecided: others"
     )
 
 
@@ -135,12 +139,12 @@ def _tell_worst(errors: Sequence[tuple[float, float]]) -> str:
     return f"{distance:.2f} m, {np.degrees(turn):.1f}°"
 
 
-def _tell_trials(team: Team, options: argparse.Namespace) -> list[str]:
+def _tell_trials(team: Team, agreeing: int, options: argparse.Namespace) -> list[str]:
     rng = np.random.default_rng(options.seed)
     (cluster, *_), judged = team.join(team.alignments)
     held, decidable = 0, 0
     for _ in range(options.trials):
-        false = false_alignments(team, sorted(cluster.poses), rng, options.agreeing)
+        false = false_alignments(team, sorted(cluster.poses), rng, agreeing)
         if all(is_held(cluster, judged, each, len(false) + 1) for each in false):
             decidable += 1
             held += _holds(team, cluster, false)

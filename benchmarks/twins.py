@@ -12,12 +12,12 @@ import numpy as np
 import shapely
 from numpy.random import Generator
 
+from benchmarks.ablation import WITHOUT, Aligning, aligning_without, parameters_without
 from benchmarks.floor_plans import DOOR, WALL, Room, plan_of, room_at, row_of_rooms, seen_in
-from benchmarks.fusion import WITHOUT, parameters_without
 from benchmarks.pairs import is_right
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.commands.progress import track
-from mapweave.fusion.align import FusionParameters, align
+from mapweave.fusion.align import FusionParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, RobotMap, Submap, Trajectory
@@ -44,6 +44,7 @@ class Scene:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Say how many buildings."""
     parser.add_argument("--seeds", type=int, default=50, metavar="N", help="buildings (50)")
+    parser.add_argument("--first", type=int, default=0, metavar="K", help="the first of them (0)")
     parser.add_argument("--without", choices=WITHOUT, help="leave out, as of fusion")
     parser.add_argument("--output", type=Path, default=OUTPUT / "twins.json", help="%(default)s")
 
@@ -51,9 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Compare the maps of every scene of every building, print how often what was decided."""
     parameters = parameters_without(options.without)
+    aligning = aligning_without(options.without)
     rows = [
-        _row(name, visits, seed, make(np.random.default_rng(seed), visits), parameters)
-        for seed in track(range(options.seeds), "buildings")
+        _row(name, visits, seed, make(np.random.default_rng(seed), visits), parameters, aligning)
+        for seed in track(range(options.first, options.first + options.seeds), "buildings")
         for name, make in SCENES.items()
         for visits in VISITS
     ]
@@ -62,9 +64,14 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _row(
-    name: str, visits: int, seed: int, scene: Scene, parameters: FusionParameters
+    name: str,
+    visits: int,
+    seed: int,
+    scene: Scene,
+    parameters: FusionParameters,
+    aligning: Aligning,
 ) -> dict[str, object]:
-    found = max(align(scene.first, scene.second, parameters), key=lambda a: a.confidence)
+    found = max(aligning(scene.first, scene.second, parameters), key=lambda a: a.confidence)
     joined = found.decision == "accepted"
     right = joined and _right(found, scene)
     return {

@@ -25,6 +25,8 @@ class Evidence:
         [m] of common wall that hold the least held direction.
     complexity
         [rad²] of the most complex polyline shared (paper, VIII, V2).
+    rarity
+        [bits] how unlikely it is that two places have the wall ends in common that both maps have.
     score
         [m] in common less, by their weight, those contradicted.
     parts
@@ -43,6 +45,7 @@ class Evidence:
     residual: float | None = None
     held: float | None = None
     complexity: float | None = None
+    rarity: float | None = None
     score: float | None = None
     parts: float | None = None
     spread: float | None = None

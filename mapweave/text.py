@@ -24,7 +24,7 @@ _SENTENCES = {
     ReasonKind.ONE_ROOM: "{match}; without one room {outside:.0f} m of it tell the place: the same"
     " room may exist twice ({sure})",
     ReasonKind.ONE_KIND: "{match}; but both are bare and neither saw more, or doors of one are"
-    " walls of the other: the same wing may exist twice ({sure})",
+    " walls of the other, or more fits mirrored: the same wing may exist twice ({sure})",
     ReasonKind.UNSURE: "{match}; {next_best}; too little to be sure of the place ({sure})",
     ReasonKind.CONVINCING: "{match}; {next_best}",
     ReasonKind.PARTS_AGREE: "{parts:.0f} pairs of parts agree within {spread:.1f} m; the best held:"

@@ -25,6 +25,7 @@ from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 
 MOST_VERIFIED, MOST_LOST = 0.02, 0.01  # of the pairs of submaps; of the true joins
+DRAWN = 20  # times that pairs are drawn in the place of what shapes propose
 FRAME = 50  # [bytes] that Zenoh adds to a message
 
 
@@ -165,12 +166,30 @@ def figures(team: Sequence[Member], driven: Driven, joins: Joins) -> list[Figure
     submaps = int((sizes.sum() ** 2 - (sizes**2).sum()) // 2)
     robots = len(team) * (len(team) - 1) // 2
     every, some = (_groups(len(team), pairs) for pairs in (joins.true, joins.found))
+    lost, apart = lost_by_chance(len(team), len(driven.due), joins.true)
     return [
         Figure("pairs compared, of the pairs of submaps", len(driven.due), submaps, MOST_VERIFIED),
         Figure("pairs compared, of the pairs of robots", len(driven.due), robots),
         Figure("joins not found, as two others tell", some - every, len(joins.true), MOST_LOST),
         Figure("joins not found between two robots", _lost(joins), len(joins.true)),
+        Figure("the same, as many pairs drawn: no shapes, that cost", lost, len(joins.true)),
+        Figure("and as two others tell", apart, len(joins.true)),
     ]
+
+
+def lost_by_chance(robots: int, compared: int, true: Sequence[Pair]) -> tuple[int, int]:
+    """Return how many joins are not found when as many pairs are drawn as shapes propose.
+
+    Between two robots, and as two others tell; the mean of what is drawn many times.
+    """
+    pairs = list(combinations(range(robots), 2))
+    rng, lost = np.random.default_rng(1), list[tuple[int, int]]()
+    for _ in range(DRAWN):
+        drawn = {pairs[k] for k in rng.choice(len(pairs), min(compared, len(pairs)), replace=False)}
+        found = [pair for pair in true if pair in drawn]
+        lost.append((len(true) - len(found), _groups(robots, found) - _groups(robots, true)))
+    between, apart = np.mean(lost, axis=0)
+    return round(float(between)), round(float(apart))
 
 
 def _lost(joins: Joins) -> int:

@@ -9,6 +9,7 @@ maps cannot be joined they are compared about places: maps may be bent.
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,9 +18,10 @@ from mapweave.fusion.component import Component
 from mapweave.fusion.confidence import confidence, may_be
 from mapweave.fusion.decision import Hypothesis, decide, evidence, runner_up
 from mapweave.fusion.extrapolation import holds, reach
-from mapweave.fusion.mirrored import may_be_mirrored, mirrored, told_if_mirrored
+from mapweave.fusion.mirrored import if_mirrored, told_if_mirrored, unless_mirrored
 from mapweave.fusion.parameters import FusionParameters, chosen
 from mapweave.fusion.places import compare_at_places, is_one_place, located
+from mapweave.fusion.ranking import Fields, find_alignments, rated
 from mapweave.fusion.rivals import without_its_room
 from mapweave.fusion.rooms import outside
 from mapweave.fusion.wings import unless_one_kind
@@ -27,23 +29,18 @@ from mapweave.geometry import se2
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
-from mapweave.maps import Alignment, LineMap, RobotMap
+from mapweave.maps import Alignment, Decision, LineMap, RobotMap
 from mapweave.matching.coarse_places import coarse_places
-from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import (
     PreparedMap,
     different,
-    hypothesise,
     propose_all,
     propose_by_walls,
 )
-from mapweave.matching.icp import Target, align_all
-from mapweave.matching.verification import shared_complexity, verify
+from mapweave.matching.verification import verify
 from mapweave.reasons import Reason, ReasonKind
 
-__all__ = ["FusionParameters", "align", "align_maps", "compare", "find_alignments", "prepare"]
-
-Fields = tuple[DistanceField, DistanceField]  # judged by: of the reference, and of the other
+__all__ = ["FusionParameters", "align", "align_maps", "compare", "prepare"]
 
 
 def align(
@@ -120,10 +117,17 @@ def _align(first: Component, second: Component, p: FusionParameters) -> Alignmen
 
 def _mirrored(first: Component, second: Component, p: FusionParameters) -> Alignment | None:
     """Compare two components, the second one mirrored, by parallel walls alone."""
-    ours, theirs = first.shape, second.shape
-    if ours is None or theirs is None or not may_be_mirrored(ours, theirs, p):
+    if first.shape is None or second.shape is None:
         return None
-    pair = first.name, ours, second.name, replace(theirs, lines=mirrored(theirs.lines)), p
+    look = partial(_by_shifts, (first.name, first.shape), second.name, p)
+    return if_mirrored(first.shape, second.shape, p.mirrored_wall, p, look)
+
+
+def _by_shifts(
+    first: tuple[str, PreparedMap], b: str, p: FusionParameters, second: PreparedMap
+) -> Alignment | None:
+    """Return what shifts of parallel walls alone tell of two maps, where they do."""
+    pair = *first, b, second, p
     return _told_coarsely(*pair) or _by_walls(*pair)[0]
 
 
@@ -149,6 +153,8 @@ def _at_place(
     if a is None or b is None or found.decision == "refused" or found.evidence.is_empty:
         return found
     found = unless_one_kind(found, a, b, p.verification, p.wings, rigid=whole)
+    look = partial(_by_shifts, (found.reference, a), found.other, p)
+    found = unless_mirrored(found, a, b, p, look)
     far = reach(a.raster, b.raster, found.transform, p.verification)
     place = found.confidence if found.decision == "accepted" else None
     return replace(found, evidence=replace(found.evidence, reach=far, place=place))
@@ -208,7 +214,7 @@ def compare(
             return found
         possible = propose_all(first, second, shifted, p.hypotheses)
     ranked = find_alignments(first, second, p, possible)
-    return _decided(a, b, ranked, (first.raster, second.raster), p)
+    return _decided(a, first, b, second, ranked, p)
 
 
 def _told_coarsely(
@@ -226,13 +232,13 @@ def _told_coarsely(
     middle = fields[1].oriented.points.mean(axis=0)
     leaders = different(places.aligned, places.scores, middle, p.hypotheses)[:2]
     if places.scores.max() < p.decision.min_common:
-        found = _decided(a, b, _as_hypotheses(places.aligned[leaders], fields, p), fields, p)
+        found = _decided(a, first, b, second, _as_hypotheses(places.aligned[leaders], fields, p), p)
         return found if found.decision == "refused" else None
     weight, least = p.verification.contradiction_weight, p.decision.min_confidence
     if may_be(places.scores[leaders].tolist(), weight, p.confidence) < least:
         return None
     ranked = find_alignments(first, second, p, places.shifted)
-    found = _decided(a, b, ranked, (first.raster, second.raster), p)
+    found = _decided(a, first, b, second, ranked, p)
     return found if found.decision == "accepted" else None
 
 
@@ -257,12 +263,17 @@ def _by_walls(
     if may_be(scores[leaders[:2]].tolist(), weight, p.confidence) < least:
         return None, shifted
     ranked = find_alignments(first, second, p, shifted)
-    found = _decided(a, b, ranked, (first.raster, second.raster), p)
+    found = _decided(a, first, b, second, ranked, p)
     return found if found.decision == "accepted" else None, shifted
 
 
 def _decided(
-    a: str, b: str, ranked: Sequence[Hypothesis], fields: Fields, p: FusionParameters
+    a: str,
+    first: PreparedMap,
+    b: str,
+    second: PreparedMap,
+    ranked: Sequence[Hypothesis],
+    p: FusionParameters,
 ) -> Alignment:
     """Return the alignment that the best of hypotheses is, and what is decided about it."""
     if not ranked:
@@ -270,78 +281,29 @@ def _decided(
     best, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
     decision, cause = decide(best, rival, sure, p.decision)
-    if decision != "refused":  # whichever room it is
-        beyond = outside(*fields, best.transform, p.verification, p.rooms)
-        one_room = beyond < p.rooms.min_outside
-        asked = p.verification, p.rooms, p.wings.crossings
-        counted = without_its_room(best, rival, beyond, fields, *asked)
-        sure = confidence(best.verdict, counted.verdict if counted else None, p.confidence)
-        sure *= p.rooms.unique if one_room else 1.0
-        little = beyond if one_room else None
-        decision, cause = decide(best, counted, sure, p.decision, little)
+    if decision != "refused":
+        best = rated(best, first, second, p)
+        rival = rival and rated(rival, first, second, p)
+        decision, sure, cause = _whichever_room(best, rival, (first.raster, second.raster), p)
     if decision == "refused" or cause.kind is ReasonKind.RIVAL:
         sure = min(sure, p.rooms.unique)
     other = None if rival is None else runner_up(best, rival)
     return Alignment(a, b, best.transform, decision, sure, cause, evidence(best), other)
 
 
-def find_alignments(
-    first: PreparedMap, second: PreparedMap, p: FusionParameters, possible: FloatArray | None = None
-) -> list[Hypothesis]:
-    """Return the hypotheses that differ, best first; none where nothing proposes any."""
-    transforms, _ = hypothesise(first, second, p.hypotheses, p.verification, possible)
-    if len(transforms) == 0:
-        return []
-    aligned = _refined(first, second, transforms, p)
-    return _ranked(first, second, aligned, (first.raster, second.raster), p)
-
-
-def _ranked(
-    first: PreparedMap,
-    second: PreparedMap,
-    aligned: FloatArray,
-    fields: Fields,
-    p: FusionParameters,
-) -> list[Hypothesis]:
-    """Return the best two that differ of (k, 3) `aligned`, by what `fields` say of them."""
-    verdicts = [verify(*fields, t, p.verification) for t in aligned]
-    middle = fields[1].oriented.points.mean(axis=0)
-    # Two that ended in the same place are one, and not each other's rival.
-    ranked = different(aligned, np.array([v.score for v in verdicts]), middle, p.hypotheses)
-    return [
-        Hypothesis(
-            aligned[k],
-            se2.transform_points(aligned[k], middle),
-            verdicts[k],
-            _complexity(first.lines, second.lines, aligned[k], fields, p),
-        )
-        for k in ranked[:2]
-    ]
-
-
-def _refined(
-    first: PreparedMap, second: PreparedMap, starts: FloatArray, p: FusionParameters
-) -> FloatArray:
-    """Align the walls of `second` to those of `first` (V1) from each of (k, 3) `starts`."""
-    oriented = second.raster.oriented
-    stride = 1 + (len(oriented) - 1) // p.icp_samples
-    target = Target.of(first.raster.oriented, p.icp)
-    # Held so loosely that any wall is stronger: only what no wall holds stays where it is.
-    prior = np.diag([1 / p.loose**2, 1 / p.loose**2, 0.0])
-    fits = align_all(oriented.at(slice(None, None, stride)), target, starts, p.icp, prior)
-    return np.array([fit.pose for fit in fits])
-
-
-def _complexity(
-    first: LineMap, second: LineMap, transform: FloatArray, fields: Fields, p: FusionParameters
-) -> float:
-    """Return the complexity of what is shared [rad²], in the map that shows more of it (V2)."""
-    here, there = fields
-    back = se2.inverse(transform)
-    return max(
-        shared_complexity(here, there, transform, second, p.verification),
-        shared_complexity(there, here, back, first, p.verification),
-    )
+def _whichever_room(
+    best: Hypothesis, rival: Hypothesis | None, fields: Fields, p: FusionParameters
+) -> tuple[Decision, float, Reason]:
+    """Decide about what is not refused, how sure it is, and why: rooms may exist twice."""
+    beyond = outside(*fields, best.transform, p.verification, p.rooms)
+    one_room = beyond < p.rooms.min_outside
+    asked = p.verification, p.rooms, p.wings.crossings
+    counted = without_its_room(best, rival, beyond, fields, *asked)
+    against = counted.verdict if counted else None
+    sure = confidence(best.verdict, against, p.confidence, best.rarity or 0.0)
+    sure *= p.rooms.unique if one_room else 1.0
+    decision, cause = decide(best, counted, sure, p.decision, beyond if one_room else None)
+    return decision, sure, cause
 
 
 def _no_alignment(a: str, b: str, cause: Reason) -> Alignment:

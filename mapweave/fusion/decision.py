@@ -2,7 +2,8 @@
 
 The best hypothesis must explain much wall, contradict little free space, be held in every
 direction, share a shape or be held well by straight walls, and leave the best *different*
-hypothesis far behind. Each condition that fails is the reason given.
+hypothesis far behind. Each condition that fails is the reason given. What is rare enough to be told
+among all places of all maps needs less of that: its wall ends hold it, and are a shape.
 """
 
 from dataclasses import dataclass
@@ -36,6 +37,20 @@ class DecisionParameters(StageParameters):
     )
     min_held: float = Field(
         2.5, gt=0, description="[m] of common wall across the weakest direction"
+    )
+    min_rarity: float = Field(
+        45.0,
+        ge=0,
+        description="[bits] of what is rare: half a million places where a map may lie in another"
+        " of 40 m, 19 bits; a million pairs of maps, 20; one wrong in a hundred such teams, 6. Of"
+        " 1499 pairs of stretches no wrong hypothesis that is not refused has more than 28, but"
+        " for one room that is there twice",
+    )
+    rarity_lead: float = Field(
+        20.0, ge=0, description="[bits] of what is rare before its rival: a million to one"
+    )
+    rare_held: float = Field(
+        0.5, gt=0, description="[m] across the weakest direction of what is rare: two jambs"
     )
     min_complexity: float = Field(
         0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"
@@ -82,12 +97,15 @@ class Hypothesis:
         What both maps say of it.
     complexity
         [rad²] of what is shared (V2); None where it was not asked for: what is refused anyway.
+    rarity
+        [bits] of it (H1), likewise.
     """
 
     transform: FloatArray
     place: FloatArray
     verdict: Verdict
     complexity: float | None = None
+    rarity: float | None = None
 
 
 def decide(
@@ -107,9 +125,11 @@ def decide(
         return "refused", Reason(ReasonKind.LITTLE_COMMON, {"common": v.common})
     if v.overlap < p.min_overlap:
         return "refused", Reason(ReasonKind.CONTRADICTED, match)
-    if v.held < p.min_held:
+    rare = _is_rare(best, rival, p)
+    if v.held < (p.rare_held if rare else p.min_held):
         return "ambiguous", Reason(ReasonKind.PARALLEL, match)
-    if (best.complexity or 0.0) < p.min_complexity and v.held < p.plain_held:
+    plain = (best.complexity or 0.0) < p.min_complexity and v.held < p.plain_held
+    if plain and not rare:
         return "ambiguous", Reason(ReasonKind.STRAIGHT, match)
     weak = rival is not None and rival.verdict.overlap < p.min_overlap
     most = p.max_weak_rival if weak else p.max_rival
@@ -121,9 +141,15 @@ def decide(
     if outside is not None:
         numbers = {**match, "outside": outside, "confidence": sure}
         return "ambiguous", Reason(ReasonKind.ONE_ROOM, numbers)
-    if sure < p.min_confidence or lead < p.min_lead:
+    if sure < p.min_confidence or (lead < p.min_lead and not rare):
         return "ambiguous", Reason(ReasonKind.UNSURE, {**match, **next_best, "confidence": sure})
     return "accepted", Reason(ReasonKind.CONVINCING, {**match, **next_best})
+
+
+def _is_rare(best: Hypothesis, rival: Hypothesis | None, p: DecisionParameters) -> bool:
+    """Whether what is shared is rare enough to tell the place, and much rarer than by the rival."""
+    least = p.rarity_lead + (rival.rarity or 0.0 if rival else 0.0)
+    return (best.rarity or 0.0) >= max(p.min_rarity, least)
 
 
 def _against(best: Hypothesis, rival: Hypothesis) -> dict[str, float]:
@@ -155,6 +181,7 @@ def evidence(hypothesis: Hypothesis) -> Evidence:
         float(v.residual),
         float(v.held),
         hypothesis.complexity,
+        hypothesis.rarity,
         v.score,
     )
 

@@ -1,7 +1,7 @@
 """Maps that fit only mirrored: a sensor hangs upside down, or turns the other way round, unsaid.
 
 No log betrays it, and no rigid motion mends it; the maps of others do. It is told, and never
-joins.
+joins. And wings of a building that are mirror images of each other, of which some rooms fit.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from mapweave.fusion.parameters import FusionParameters
+from mapweave.fusion.wings import is_bare, of_one_kind
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap
 from mapweave.matching.coarse_places import most_if_mirrored
@@ -18,6 +19,8 @@ from mapweave.reasons import Reason, ReasonKind
 
 MIRROR: FloatArray = np.array([1.0, -1.0])  # what x and y become
 
+Looking = Callable[[PreparedMap], Alignment | None]
+"""Compares the reference with a map that is a mirror image; None where nothing convinces."""
 Joined = Callable[[int], Alignment | None]
 """Compares a pair of components again, the second mirrored; None where nothing convinces."""
 
@@ -36,11 +39,32 @@ def mirrored(lines: LineMap) -> LineMap:
     )
 
 
-def may_be_mirrored(ours: PreparedMap, theirs: PreparedMap, p: FusionParameters) -> bool:
-    """Whether so much may be in common of two maps, one of them mirrored, as must be to tell."""
+def if_mirrored(
+    ours: PreparedMap, theirs: PreparedMap, wall: float, p: FusionParameters, look: Looking
+) -> Alignment | None:
+    """Return what `look` tells of `theirs` mirrored; None where `wall` [m] cannot be in common."""
     maps = ours.coarse, theirs.coarse, theirs.lines.segments
     most = most_if_mirrored(*maps, p.hypotheses.coarse, p.verification)
-    return most >= p.mirrored_part * p.mirrored_wall
+    if most < p.mirrored_part * wall:
+        return None
+    return look(replace(theirs, lines=mirrored(theirs.lines)))
+
+
+def unless_mirrored(
+    found: Alignment, ours: PreparedMap, theirs: PreparedMap, p: FusionParameters, look: Looking
+) -> Alignment:
+    """Return `found`; ambiguous where maps are bare and fit much better if one is mirrored.
+
+    Wings of a building are often mirror images of each other, of which some rooms fit as they are.
+    """
+    asked = ours, theirs, found.transform, p.verification, p.wings
+    if found.decision != "accepted" or not is_bare(*asked):
+        return found
+    least = p.wings.mirrored * (found.evidence.score or 0.0)
+    other = if_mirrored(ours, theirs, least, p, look)
+    if other is None or other.decision != "accepted" or (other.evidence.score or 0.0) < least:
+        return found
+    return of_one_kind(found, p.wings)
 
 
 def told_if_mirrored(

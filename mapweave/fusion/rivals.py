@@ -6,9 +6,9 @@ the best explains much more than a room: then the room is what exists twice.
 
 from dataclasses import replace
 
-from mapweave.fusion.crossings import CrossingParameters, crossed
 from mapweave.fusion.decision import Hypothesis
 from mapweave.fusion.rooms import RoomParameters, outside
+from mapweave.matching.crossings import CrossingParameters, crossed
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import VerificationParameters
 

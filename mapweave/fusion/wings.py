@@ -2,8 +2,9 @@
 
 Floors and wings of a building are built alike, or mirrored. Two maps that are nearly the same,
 with nothing beyond in either, were made in one place or in two that are built alike; walls do not
-tell. Nor do they where the doors of one are walls of the other. What people put there does: it
-stands at odd angles to the walls, and no two wings have it alike.
+tell. Nor do they where the doors of one are walls of the other, or where much more fits once one
+of the maps is mirrored. What people put there does: it stands at odd angles to the walls, and no
+two wings have it alike.
 """
 
 from collections.abc import Sequence
@@ -12,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.fusion.crossings import CrossingParameters, crossed
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.lines.directions import main_directions
 from mapweave.maps import Alignment, LineMap
+from mapweave.matching.crossings import CrossingParameters, crossed
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.matching.verification import VerificationParameters, coinciding
@@ -53,6 +54,12 @@ class WingParameters(BaseModel):
         " which alignments at places of bent maps are dissimilar; of 371 right joins of six logs"
         " none has 0.061, a wrong one across buildings has 0.16",
     )
+    mirrored: float = Field(
+        1.25,
+        gt=1,
+        description="score of mirrored maps, as a share of that of the maps as they are, from which"
+        " bare ones are of two wings, one the mirror image of the other",
+    )
     turn: float = Field(0.14, gt=0, description="[rad] from all main directions, of such wall: 8°")
     across: float = Field(
         0.1, gt=0, description="[m] that its ends are apart across them: noise has less"
@@ -78,8 +85,11 @@ def unless_one_kind(
     if found.decision == "refused":
         return found
     asked = reference, other, found.transform, verification, parameters
-    if not told_by_kind(*asked, rigid=rigid):
-        return found
+    return of_one_kind(found, parameters) if told_by_kind(*asked, rigid=rigid) else found
+
+
+def of_one_kind(found: Alignment, parameters: WingParameters) -> Alignment:
+    """Return `found` as that of two places built alike, as it may be."""
     sure = found.confidence * parameters.unique
     if found.decision == "ambiguous":
         return replace(found, confidence=sure)
@@ -112,21 +122,46 @@ def told_by_kind(
         Whether the transform is right for maps as wholes. Of bent ones other doors may be crossed,
         and only much wall across them tells, whatever stands at odd angles.
     """
+    a, b, p = reference.raster, other.raster, parameters
+    metres = _shared(reference, other, transform, verification)
+    if not rigid and _dissimilar(a, b, transform, metres, verification, p):
+        return True
+    if not _is_bare(metres, p):
+        return False
+    if all(m.sum() >= p.shared * shape.raster.weight.sum() for shape, m in metres):
+        return True
+    return rigid and crossed(a, b, transform, verification, p.crossings) >= p.crossings.door
+
+
+def is_bare(
+    reference: PreparedMap,
+    other: PreparedMap,
+    transform: FloatArray,
+    verification: VerificationParameters,
+    parameters: WingParameters,
+) -> bool:
+    """Tell whether hardly any of the wall in common stands at odd angles; as of `told_by_kind`."""
+    return _is_bare(_shared(reference, other, transform, verification), parameters)
+
+
+def _shared(
+    reference: PreparedMap,
+    other: PreparedMap,
+    transform: FloatArray,
+    verification: VerificationParameters,
+) -> list[tuple[PreparedMap, FloatArray]]:
+    """Return both maps, each with the metres of wall in common that its samples stand for."""
     a, b = reference.raster, other.raster
     ways = (
         (other, coinciding(a, b, transform, verification)),
         (reference, coinciding(b, a, se2.inverse(transform), verification)),
     )
-    metres = [(shape, shape.raster.weight * on) for shape, on in ways]
-    p = parameters
-    if not rigid and _dissimilar(a, b, transform, metres, verification, p):
-        return True
+    return [(shape, shape.raster.weight * on) for shape, on in ways]
+
+
+def _is_bare(metres: Sequence[tuple[PreparedMap, FloatArray]], p: WingParameters) -> bool:
     odd = [m[_is_odd(shape.lines, p)[shape.raster.segment]].sum() for shape, m in metres]
-    if min(odd) >= p.odd:
-        return False
-    if all(m.sum() >= p.shared * shape.raster.weight.sum() for shape, m in metres):
-        return True
-    return rigid and crossed(a, b, transform, verification, p.crossings) >= p.crossings.door
+    return bool(min(odd) < p.odd)
 
 
 def _dissimilar(

@@ -164,6 +164,7 @@ class EvidenceFile(FileModel):
     residual: float | None = None
     held: float | None = None
     complexity: float | None = None
+    rarity: float | None = None
     score: float | None = None
     parts: float | None = None
     spread: float | None = None

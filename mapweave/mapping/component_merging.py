@@ -30,9 +30,12 @@ from mapweave.parameters import StageParameters, derived
 class ComponentMergingParameters(StageParameters):
     """When components are compared, and where a robot that lost track is looked for."""
 
-    # Nothing undoes a join within a robot's map, so a shape is asked for, not straight walls alone.
+    # Nothing undoes a join within a robot's map, so a shape is asked for, not straight walls alone;
+    # nor does rarity make up for what else is asked.
     fusion: FusionParameters = derived(
-        lambda c: FusionParameters.of(c, decision=DecisionParameters.of(c, plain_held=math.inf))
+        lambda c: FusionParameters.of(
+            c, decision=DecisionParameters.of(c, plain_held=math.inf, min_rarity=math.inf)
+        )
     )
     place_recognition: PlaceRecognitionParameters = derived(PlaceRecognitionParameters.of)
     min_lines: int = Field(

@@ -25,7 +25,9 @@ from mapweave.matching.fft_correlation import FftCorrelationParameters, Marks, c
 from mapweave.matching.field_icp import FieldIcpParameters, align_on_raster
 from mapweave.matching.verification import VerificationParameters, coarse_scores
 from mapweave.parameters import StageParameters, derived
+from mapweave.shape.background import Counts
 from mapweave.shape.corners import CornerParameters, Corners, find_corners, propose
+from mapweave.shape.rarity import RarityParameters, WallEnds, count_words, wall_ends
 from mapweave.shape.windows import WindowParameters, Windows, all_windows, match_all
 
 
@@ -38,6 +40,7 @@ class HypothesisParameters(StageParameters):
     corners: CornerParameters = CornerParameters()
     correlation: FftCorrelationParameters = derived(FftCorrelationParameters.of)
     coarse: CoarsePlaceParameters = derived(CoarsePlaceParameters.of)
+    rarity: RarityParameters = RarityParameters()
     turn_separation: float = Field(0.17, gt=0, description="[rad] between likely turns: 10°")
     alignment: FieldIcpParameters = FieldIcpParameters()
     proposal_samples: int = Field(60, ge=10, description="of a map's walls, scoring proposals")
@@ -92,6 +95,16 @@ class PreparedMap:
     def corners(self) -> Corners:
         """Pairs of walls that meet."""
         return find_corners(self.lines.segments, self.parameters.corners)
+
+    @cached_property
+    def ends(self) -> WallEnds:
+        """Of its walls, each once."""
+        return wall_ends(self.lines.segments, self.parameters.rarity)
+
+    @cached_property
+    def words(self) -> Counts:
+        """How often which pair of those is there."""
+        return count_words(self.ends, self.parameters.rarity)
 
 
 def hypothesise(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.scale.command import Figure, Joins, compare_all, figures
+from benchmarks.scale.command import Figure, Joins, compare_all, figures, lost_by_chance
 from benchmarks.scale.driving import Costs, Driven, drive
 from benchmarks.scale.made_up import SUBMAPS, robots_of
 from benchmarks.scale.members import is_joined_right, made_up
@@ -75,3 +75,14 @@ def test_a_figure_is_short_above_its_share_alone() -> None:
     assert Figure("a", 3, 100, 0.02).short
     assert not Figure("a", 2, 100, 0.02).short
     assert not Figure("a", 99, 100).short
+
+
+def test_all_pairs_lose_no_join_none_lose_all_and_half_of_them_lose_half() -> None:
+    true = [(0, k) for k in range(1, 9)]
+    assert lost_by_chance(9, 36, true) == (0, 0)
+    assert lost_by_chance(9, 0, true) == (8, 8)
+    lost, apart = lost_by_chance(9, 18, true)
+    assert 3 <= lost == apart <= 5  # of a star, each join is the only one
+    chain = [*true, (1, 2), (2, 3), (3, 4), (5, 6), (6, 7)]
+    lost, apart = lost_by_chance(9, 18, chain)
+    assert apart < lost

@@ -45,8 +45,8 @@ ELSE = "12 m of wall in common, 3.0 m contradicted"
         (Reason(ReasonKind.ONE_ROOM, {**MATCH, "outside": 1.2, "confidence": 0.79}),
          f"{FITS}; without one room 1 m of it tell the place: the same room may exist twice (79%)"),
         (Reason(ReasonKind.ONE_KIND, {**MATCH, "confidence": 0.79}),
-         f"{FITS}; but both are bare and neither saw more, or doors of one are walls of the other:"
-         " the same wing may exist twice (79%)"),
+         f"{FITS}; but both are bare and neither saw more, or doors of one are walls of the other,"
+         " or more fits mirrored: the same wing may exist twice (79%)"),
         (Reason(ReasonKind.UNSURE, {**MATCH, "confidence": 0.614}),
          f"{FITS}; nothing else fits; too little to be sure of the place (61%)"),
         (Reason(ReasonKind.UNSURE, {**MATCH, **RIVAL, "confidence": 0.614}),

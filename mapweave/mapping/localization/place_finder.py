@@ -12,8 +12,9 @@ from typing import Protocol
 import numpy as np
 from pydantic import Field
 
-from mapweave.fusion.align import FusionParameters, find_alignments, prepare
+from mapweave.fusion.align import FusionParameters, prepare
 from mapweave.fusion.decision import Hypothesis
+from mapweave.fusion.ranking import find_alignments
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.localization.known_map import KnownMap

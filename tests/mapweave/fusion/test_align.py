@@ -189,7 +189,7 @@ def test_exchanging_the_maps_inverts_the_transform() -> None:
 
 def test_evidence_and_runner_up_are_plain_finite_numbers() -> None:
     found, _ = compared(LEFT, RIGHT, 1)
-    names = "common contradicted overlap residual held complexity score reach place"
+    names = "common contradicted overlap residual held complexity rarity score reach place"
     numbers = found.evidence.by_name()
     assert names.split() == list(numbers)
     assert all(isinstance(number, float) for number in numbers.values())
@@ -324,3 +324,36 @@ def test_straight_walls_tell_places_apart_where_enough_of_them_run_across_the_ot
     found, reason = decide(best, None, 0.95, DecisionParameters())
     assert found == decision
     assert (reason.kind is ReasonKind.STRAIGHT) == (decision == "ambiguous")
+
+
+@pytest.mark.parametrize(
+    ("rarity", "of_rival", "held", "decision"),
+    [
+        (50.0, 0.0, 0.6, "accepted"),  # wall ends hold it where walls do not
+        (44.0, 0.0, 0.6, "ambiguous"),  # a million pairs of maps have as much by chance
+        (50.0, 0.0, 0.4, "ambiguous"),  # nothing runs across
+        (60.0, 35.0, 0.6, "accepted"),
+        (60.0, 45.0, 0.6, "ambiguous"),  # as rare elsewhere
+        (None, None, 0.6, "ambiguous"),
+    ],
+)
+def test_what_is_rare_needs_less_wall_across_no_other_shape_and_less_of_a_lead(
+    rarity: float | None, of_rival: float | None, held: float, decision: str
+) -> None:
+    """Seven metres of straight wall, four more than a rival has."""
+    verdicts = (Verdict(s, 0.0, 1.0, 0.02, held, 5.0) for s in (7.0, 3.0))
+    best, rival = (
+        Hypothesis(np.array([x, 0.0, 0.0]), np.array([x, 0.0]), verdict, 0.01, bits)
+        for x, verdict, bits in zip((0.0, 9.0), verdicts, (rarity, of_rival), strict=True)
+    )
+    assert decide(best, rival, 0.95, DecisionParameters())[0] == decision
+
+
+def test_rarity_makes_up_for_no_contradiction_and_for_no_rival() -> None:
+    p, sure = DecisionParameters(), 0.99
+    best = Hypothesis(np.zeros(3), np.zeros(2), Verdict(40.0, 4.0, 0.9, 0.02, 9.0, 5.0), 0.5, 500.0)
+    assert decide(best, None, sure, p)[0] == "refused"
+    strong, weak = (Verdict(s, 0.0, 1.0, 0.02, 9.0, 5.0) for s in (40.0, 25.0))
+    best = Hypothesis(np.zeros(3), np.zeros(2), strong, 0.5, 500.0)
+    rival = Hypothesis(np.array([9.0, 0, 0]), np.array([9.0, 0]), weak, 0.5, 0.0)
+    assert decide(best, rival, sure, p)[1].kind is ReasonKind.RIVAL

@@ -22,8 +22,9 @@ def test_it_is_a_probability_even_for_nonsense() -> None:
 
 def test_without_a_rival_it_is_the_logistic_function_of_the_features() -> None:
     best = verdict(30, 2)
-    odds = P.intercept + features(best, None) @ [P.score, P.held, P.overlap, P.lead]
-    assert confidence(best, None, P) == pytest.approx(1 / (1 + np.exp(-odds)), rel=1e-12)
+    slopes = [P.score, P.held, P.overlap, P.lead, P.rarity]
+    odds = P.intercept + features(best, None, 25.0) @ slopes
+    assert confidence(best, None, P, 25.0) == pytest.approx(1 / (1 + np.exp(-odds)), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -40,6 +41,11 @@ def test_it_grows_with_what_speaks_for_the_alignment(less: Verdict, more: Verdic
     assert confidence(more, rival, P) > confidence(less, rival, P)
 
 
+def test_it_grows_with_how_rare_a_shape_is_as_far_as_that_tells() -> None:
+    said = [confidence(verdict(10), None, P, bits) for bits in (0.0, 20.0, 60.0, 90.0)]
+    assert said[0] < said[1] < said[2] == said[3]
+
+
 def test_a_strong_rival_lowers_it_and_a_hopeless_one_counts_as_none() -> None:
     best = verdict(20)
     assert confidence(best, verdict(18), P) < confidence(best, verdict(4), P)
@@ -47,7 +53,7 @@ def test_a_strong_rival_lowers_it_and_a_hopeless_one_counts_as_none() -> None:
 
 
 def test_a_hypothesis_more_contradicted_than_matched_is_improbable_however_it_is_held() -> None:
-    assert features(verdict(3, 9), None)[0] == 0
+    assert features(verdict(3, 9), None, 0.0)[0] == 0
     assert confidence(verdict(300, 900, held=100.0), None, P) < 0.5
 
 

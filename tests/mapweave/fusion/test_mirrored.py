@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from mapweave.fusion.align import align
+from mapweave.fusion.align import FusionParameters, align, align_maps
 from mapweave.fusion.mirrored import mirrored, told_if_mirrored
 from mapweave.maps import Alignment, Decision, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
@@ -14,6 +14,7 @@ from mapweave.scan.free_space import from_rings
 from tests.mapweave.buildings import (
     BUILDING,
     OTHER_BUILDING,
+    corridor,
     line_map,
     part,
     random_pose,
@@ -87,6 +88,31 @@ def test_plain_rooms_that_are_their_own_mirror_images_are_not_called_mirrored() 
     room = np.array([[0, 0], [14, 0], [14, 9], [0, 9]])
     lines = line_map(walls_of(room), (room + np.sign([7, 4.5] - room) * 0.15,))
     assert compared(lines, lines).cause.kind is not ReasonKind.MIRRORED
+
+
+# Three rooms that are their own mirror image, and one beside them that is not.
+WING = corridor(16.0, below=[(1, 3, 2.5), (4, 7, 4.0), (8, 10, 2.5), (12, 14.5, 1.5)], above=[])
+
+
+def wings(mirrored_share: float, *, is_image: bool) -> Alignment:
+    """Compare a wing with its mirror image, or with a part of itself."""
+    first = part(WING, 0.5, 15.5)
+    other = mirrored(first) if is_image else part(WING, 0.5, 12.5)
+    p = FusionParameters()
+    p = p.model_copy(update={"wings": p.wings.model_copy(update={"mirrored": mirrored_share})})
+    rng = np.random.default_rng(2)
+    return align_maps(("a/0", shaken(first, rng)), ("b/0", shaken(other, rng)), p)
+
+
+def test_a_wing_and_its_mirror_image_are_not_joined_by_rooms_that_fit_as_they_are() -> None:
+    assert wings(1e9, is_image=True).decision == "accepted"
+    found = wings(1.25, is_image=True)
+    assert found.decision == "ambiguous"
+    assert found.cause.kind is ReasonKind.ONE_KIND
+
+
+def test_a_wing_seen_twice_is_joined_though_its_mirror_image_nearly_fits() -> None:
+    assert wings(1.25, is_image=False).decision == "accepted"
 
 
 NOTHING = Alignment(

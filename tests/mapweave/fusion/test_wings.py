@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mapweave.fusion.align import FusionParameters, align_maps, prepare
-from mapweave.fusion.crossings import crossed
 from mapweave.fusion.wings import told_by_kind
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import Alignment, LineMap
+from mapweave.matching.crossings import crossed
 from mapweave.matching.hypotheses import PreparedMap
 from mapweave.reasons import ReasonKind
 from tests.mapweave.buildings import BUILDING, Niche, corridor, line_map, part, shaken, walls_of

@@ -265,7 +265,7 @@ def test_however_often_a_place_was_seen_comparing_it_costs_no_more(parts: list[L
 def test_within_a_robots_map_straight_walls_join_nothing_however_well_held() -> None:
     """Nobody undoes such a join, so a shape is asked for; two robots are joined by the same."""
     verdict = Verdict(60.0, 0.0, 1.0, 0.02, 50.0, 5.0)
-    straight = Hypothesis(np.zeros(3), np.zeros(2), verdict, 0.0)
+    straight = Hypothesis(np.zeros(3), np.zeros(2), verdict, 0.0, 500.0)
     within, between = ComponentMergingParameters().fusion.decision, FusionParameters().decision
     assert decide(straight, None, 0.99, within)[0] == "ambiguous"
     assert decide(straight, None, 0.99, between)[0] == "accepted"
