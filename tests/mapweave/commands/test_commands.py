@@ -390,11 +390,8 @@ def test_a_spoiled_map_file_is_not_exported(
 
 def test_two_maps_of_one_robot_are_not_two_robots(maps: dict[str, Path]) -> None:
     done = main_here("fuse", maps["a"], maps["a"])
-    assert_fails_in_one_line(
-        done,
-        maps["a"],
-        "robot 'a' was given already; expected a map of another robot: give each one an id",
-    )
+    said = "robot 'a' was given already; expected a map of another robot: give each one an id"
+    assert_fails_in_one_line(done, maps["a"], said)
 
 
 def test_a_map_is_exported_as_geometry(maps: dict[str, Path], tmp_path: Path) -> None:
