@@ -62,7 +62,9 @@ def _read_distinct(paths: list[Path]) -> list[RobotMap | JointMap]:
         some_map = load(path)
         if twice := sorted(_robots(some_map) & robots):
             raise FileError(
-                path, f"robot {twice[0]!r} was given already; expected a map of another robot"
+                path,
+                f"robot {twice[0]!r} was given already; expected a map of another robot, as"
+                " mapweave map --robot names it",
             )
         robots |= _robots(some_map)
         maps.append(some_map)
