@@ -178,9 +178,9 @@ def test_maps_are_of_the_time_of_the_robots_clock_which_may_be_simulated(mapped:
     speaker.pose(pose(stamp=5.5))
     speaker.robot_map(mapped)
     said = dict(call.args for call in node.put.call_args_list)
-    grid = STORE.deserialize_cdr(said["/r1/map"], GRID)
-    markers = STORE.deserialize_cdr(said["/r1/walls"], MARKERS).markers
-    stamps = [grid.header.stamp, *(m.header.stamp for m in markers if m.ns == "walls")]
+    grid: Any = STORE.deserialize_cdr(said["/r1/map"], GRID)
+    told: Any = STORE.deserialize_cdr(said["/r1/walls"], MARKERS)
+    stamps = [grid.header.stamp, *(m.header.stamp for m in told.markers if m.ns == "walls")]
     assert len(stamps) > 1
     assert {(stamp.sec, stamp.nanosec) for stamp in stamps} == {(5, 500_000_000)}
 
