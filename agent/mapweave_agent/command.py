@@ -18,7 +18,7 @@ from mapweave.cli import (
 from mapweave.commands.garbage import spared
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
-from mapweave.errors import UnusableOdometryError
+from mapweave.errors import ArgumentError, UnusableOdometryError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
 from mapweave.io.map_files import save
@@ -184,6 +184,9 @@ def _read_options(
     options: argparse.Namespace, config: Config, endpoints: tuple[str, ...]
 ) -> ReadOptions:
     odometry: OdometryChoice = options.odometry
+    if odometry == OdometryChoice(prior=True) and options.source.startswith("ros2:"):
+        problem = "prior is that of a recording; expected ros2:/odom or ros2:/tf, or another topic"
+        raise ArgumentError("--odometry", problem)
     if odometry.live and not options.source.startswith("ros2:"):
         raise UnusableOdometryError(options.source, f"ros2:{odometry.topic}")
     return ReadOptions(

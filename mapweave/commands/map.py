@@ -15,6 +15,7 @@ from mapweave.cli import (
     argument,
     config_of,
 )
+from mapweave.commands.ending import until_interrupted
 from mapweave.commands.garbage import spared
 from mapweave.commands.progress import busy, track
 from mapweave.commands.starting import Start, add_start_arguments
@@ -144,8 +145,11 @@ def _map_all(
     total = None if scans is None else options.scans.count(scans)
     name = Path(options.log).name
     taken = 0
+    chosen = options.scans.of(source.scans())
+    if source.live:  # nothing else may end it
+        chosen = until_interrupted(chosen)
     with spared():
-        for scan in track(options.scans.of(source.scans()), f"mapping {name}", total):
+        for scan in track(chosen, f"mapping {name}", total):
             mapper.add(scan)
             taken += 1
     return mapper.finish(), taken
@@ -159,14 +163,15 @@ def _new(robot_map: RobotMap, start: Start) -> RobotMap:
 def _check_placed(options: argparse.Namespace, new: RobotMap, taken: int) -> None:
     if new.submaps:
         return
+    name = "standard input" if options.log == STANDARD_INPUT else options.log
     if options.localize is not None:
         raise FileError(
-            options.log,
+            name,
             f"none of its {taken} chosen scans can be found in {options.localize}; expected some"
             " metres of a drive in a place that it shows",
         )
     raise FileError(
-        options.log,
+        name,
         f"none of its {taken} chosen scans can be mapped; expected scans whose"
         " returns are dense enough to show walls, and a range of scans that it has",
     )

@@ -11,6 +11,7 @@ Then ``lidar:/dev/ttyUSB0`` is a source: ``open_lidar("lidar:/dev/ttyUSB0", opti
 """
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from mapweave.errors import UnknownSourceError
+from mapweave.errors import FileError, UnknownSourceError
 from mapweave.io.readers.lines import split_lines
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags.frames import StaticFrames
@@ -29,6 +30,7 @@ from mapweave.scan.scan import Scan
 
 SOURCE_GROUP = "mapweave.sources"
 STANDARD_INPUT = "-"
+_TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 class ScanSource(Protocol):
@@ -72,6 +74,8 @@ def open_source(name: str, options: ReadOptions) -> ScanSource:
     ------
     UnknownSourceError
         If it looks like ``SCHEME:…``, no package knows the scheme, and there is no such file.
+    FileError
+        If it looks like a topic of ROS 2, and there is no such file.
     """
     if name == STANDARD_INPUT:
         return StandardInput(options)
@@ -80,6 +84,8 @@ def open_source(name: str, options: ReadOptions) -> ScanSource:
     if colon and scheme in openers:
         opener: SourceOpener = openers[scheme].load()
         return opener(name, options)
+    if "ros2" in openers and _TOPIC.fullmatch(name) and not Path(name).exists():
+        raise FileError(name, f"no such file; if it is a topic of ROS 2, it is said as ros2:{name}")
     if colon and scheme.isidentifier() and not Path(name).exists():
         raise UnknownSourceError(name, scheme, sorted(openers))
     return Recording(Path(name), options)

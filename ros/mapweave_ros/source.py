@@ -205,7 +205,10 @@ class _Topic:
         if self._mounting is None and alone:
             self._mounting = Mounting()
         if self._mounting is None:
-            self._refusals.add(f"nothing on {TF_STATIC} says where its frame {frame!r} sits")
+            self._refusals.add(
+                f"nothing on {TF_STATIC} says where its frame {frame!r} sits; write it, as in"
+                f" {self.laser.topic}@0.2,0,90 (metres ahead, to the left, degrees)"
+            )
         return self._mounting
 
     def scan(self, arrival: Arrival, messages: ScanMessages, index: int) -> tuple[str, Scan] | None:

@@ -88,6 +88,7 @@ class Speaker:
         self._untold = 0  # poses in a row
         self._messages = Messages()
         self._frame = ""  # of the joint map's component that is shown
+        self._stamp: float | None = None  # [s] of the newest pose: by the robots' own clock
 
     def robot_map(self, robot_map: RobotMap) -> None:
         """Tell the component that a robot is in."""
@@ -115,6 +116,7 @@ class Speaker:
     def pose(self, pose: PoseMessage) -> None:
         """Tell where a robot is: in its own map, and where that is in the joint map, if shown."""
         stamp = pose.sent if pose.stamp is None or not 0 <= pose.stamp <= MAX_STAMP else pose.stamp
+        self._stamp = stamp
         at = np.array(pose.pose)
         own = map_frame(pose.robot)
         placed = self._placed(pose.robot, at, stamp)
@@ -156,7 +158,8 @@ class Speaker:
         robots: Sequence[str],
         marks: Sequence[PlacedMark],
     ) -> None:
-        now = time.time()
+        # Where robots go by simulated time, ours is in their future: nobody could place it.
+        now = time.time() if self._stamp is None else self._stamp
         named = [(robot, self._frame_of(robot)) for robot in robots]
         self._node.put(f"{topic}/walls", self._messages.markers(shown, named, marks, frame, now))
         if len(lines.segments) == 0:

@@ -41,3 +41,13 @@ def test_mapper_backend_comparisons_and_log_get_what_the_configuration_says(
     assert compare.keywords == {"parameters": FusionParameters.of(config)}
     (scan,) = agent.return_value.run.call_args.args[0]
     np.testing.assert_allclose(np.diff(scan.angles), 0.01)
+
+
+def test_odometry_of_a_recording_is_refused_for_a_topic_with_what_is_expected(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    given = ["--robot", "a", "--source", "ros2:/scan", "--odometry", "prior"]
+    assert main(["agent", *given]) == 1
+    assert (
+        "--odometry: prior is that of a recording; expected ros2:/odom" in capsys.readouterr().err
+    )

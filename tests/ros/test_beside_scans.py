@@ -101,7 +101,8 @@ def test_several_lasers_sit_where_transforms_say_and_none_is_taken_before(endpoi
         until(lambda: any(_is_whole(scan) for scan in taken.scans), both)
         scan = next(scan for scan in taken.scans if _is_whole(scan))
     assert told[0] == (
-        f"{front}: message refused: nothing on /tf_static says where its frame 'laser' sits"
+        f"{front}: message refused: nothing on /tf_static says where its frame 'laser' sits;"
+        f" write it, as in {front}@0.2,0,90 (metres ahead, to the left, degrees)"
     )
     ahead_of, behind_of = np.abs(scan.angles) < 0.01, scan.angles < -np.pi + 0.01
     np.testing.assert_allclose(scan.ranges[ahead_of | behind_of], 2.5, atol=1e-6)

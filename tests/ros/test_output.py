@@ -4,6 +4,7 @@ import struct
 import time
 from collections.abc import Iterator
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from mapweave_protocol.wire.pose_message import JointPose
 from mapweave_ros.network import Ros2Network
 from mapweave_ros.output import Ros2Output
 from mapweave_ros.robot.frames import RobotFrames
-from mapweave_ros.speaker import topic_name
+from mapweave_ros.speaker import Speaker, topic_name
 from tests.mapweave.buildings import BUILDING, scans_along
 from tests.ros.listeners import STORE, listening
 
@@ -168,6 +169,20 @@ def pose(joint: JointPose | None = None, stamp: float | None = 5.5) -> PoseMessa
         robot="r2", boot="b", stamp=stamp, sent=9.0, scan_index=0, found=True, component="r2/0",
         pose=(1.0, 2.0, 0.5), covariance=COVARIANCE, joint=joint,
     )  # fmt: skip
+
+
+def test_maps_are_of_the_time_of_the_robots_clock_which_may_be_simulated(mapped: RobotMap) -> None:
+    node = Mock()
+    speaker = Speaker(node, RobotFrames())
+    speaker.pose(pose(stamp=0.0))
+    speaker.pose(pose(stamp=5.5))
+    speaker.robot_map(mapped)
+    said = dict(call.args for call in node.put.call_args_list)
+    grid: Any = STORE.deserialize_cdr(said["/r1/map"], GRID)
+    told: Any = STORE.deserialize_cdr(said["/r1/walls"], MARKERS)
+    stamps = [grid.header.stamp, *(m.header.stamp for m in told.markers if m.ns == "walls")]
+    assert len(stamps) > 1
+    assert {(stamp.sec, stamp.nanosec) for stamp in stamps} == {(5, 500_000_000)}
 
 
 def test_a_robot_is_where_its_pose_and_the_mounting_of_its_sensor_say(

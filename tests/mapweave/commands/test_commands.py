@@ -1,12 +1,17 @@
 """``mapweave map``, ``fuse`` and ``export`` as a person runs them: real processes, real files."""
 
+import fcntl
 import gzip
 import io
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import termios
+import time
+from array import array
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -215,20 +220,22 @@ def test_a_source_of_a_scheme_that_nobody_knows_fails_in_one_line() -> None:
     assert done.stderr.count("\n") == 1
 
 
+def as_line(scan: Scan) -> str:
+    """Return a line of JSON."""
+    return json.dumps(
+        {
+            "stamp": scan.stamp,
+            "angle_min": float(scan.angles[0]),
+            "angle_increment": float(scan.angles[1] - scan.angles[0]),
+            "ranges": [None if np.isnan(r) else r for r in scan.ranges.tolist()],
+        }
+    )
+
+
 def test_scans_on_standard_input_make_the_map_that_their_log_does(
     scans: list[Scan], tmp_path: Path
 ) -> None:
-    lines = [
-        json.dumps(
-            {
-                "stamp": scan.stamp,
-                "angle_min": float(scan.angles[0]),
-                "angle_increment": float(scan.angles[1] - scan.angles[0]),
-                "ranges": [None if np.isnan(r) else r for r in scan.ranges.tolist()],
-            }
-        )
-        for scan in scans
-    ]
+    lines = [as_line(scan) for scan in scans]
     file = tmp_path / "scans.jsonl"
     file.write_text("\n".join(['{"format": "mapweave/scans/1"}', *lines]))
     from_file, from_input = tmp_path / "file.json", tmp_path / "input.json"
@@ -242,6 +249,29 @@ def test_scans_on_standard_input_make_the_map_that_their_log_does(
     assert (done.returncode, done.stderr) == (0, b"")
     assert from_input.read_bytes() == from_file.read_bytes()
     assert len(read_map(from_file).submaps[0].trajectory.scan_index) == SCANS
+
+
+def test_ctrl_c_ends_scans_that_come_live_and_their_map_is_written(
+    scans: list[Scan], tmp_path: Path
+) -> None:
+    output = tmp_path / "map.json"
+    program = [sys.executable, "-m", "mapweave", "map", "-", "--output", str(output)]
+    with subprocess.Popen(
+        program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as driven:
+        assert driven.stdin is not None
+        driven.stdin.write("".join(f"{as_line(scan)}\n" for scan in scans))
+        driven.stdin.flush()
+        waiting = array("i", [1])
+        while waiting[0]:  # until all is read
+            time.sleep(0.1)
+            fcntl.ioctl(driven.stdin, termios.FIONREAD, waiting)
+        time.sleep(1.0)
+        driven.send_signal(signal.SIGINT)
+        said, _ = driven.communicate()
+    assert driven.returncode == 0
+    assert "scans placed" in said
+    assert read_map(output).submaps
 
 
 def test_a_missing_log_and_a_folder_fail_in_one_line(tmp_path: Path) -> None:

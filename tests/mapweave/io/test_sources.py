@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mapweave.errors import UnknownSourceError
+from mapweave.errors import FileError, UnknownSourceError
 from mapweave.io import sources
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.sources import Recording, ScanSource, StandardInput, open_source
@@ -50,6 +50,18 @@ def test_a_package_brings_a_source_under_its_scheme() -> None:
 def test_a_scheme_that_nobody_brings_names_those_there_are() -> None:
     with pytest.raises(UnknownSourceError, match="no scheme 'serial'; those known are lidar;"):
         open_source("serial:/dev/ttyUSB0", ReadOptions())
+
+
+def test_a_topic_without_its_scheme_is_told_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = EntryPoints([EntryPoint("ros2", f"{__name__}:Lidar", sources.SOURCE_GROUP)])
+    monkeypatch.setattr(sources, "entry_points", lambda group: points.select(group=group))
+    with pytest.raises(FileError, match=r"/front/scan: no such file; .* said as ros2:/front/scan"):
+        open_source("/front/scan", ReadOptions())
+    folder = tmp_path / "scan"
+    folder.mkdir()
+    assert isinstance(open_source(str(folder), ReadOptions()), Recording)
 
 
 def test_a_file_with_a_colon_in_its_name_is_a_file(
