@@ -203,14 +203,11 @@ class ComparisonSchedule:
         self._wake()
 
     @property
-    def orphans(self) -> list[AlignmentMessage]:
+    def orphans(self) -> Iterator[AlignmentMessage]:
         """What robots that are gone have found, in this robot's name: it may be all there is."""
-        learned = (pair.learned for pair in self._pairs.values())
-        return [
-            message.model_copy(update={"robot": self._robot})
-            for message in learned
-            if message is not None and self._team.is_gone(message.robot)
-        ]
+        for pair in self._pairs.values():
+            if pair.learned is not None and self._team.is_gone(pair.learned.robot):
+                yield pair.learned.model_copy(update={"robot": self._robot})
 
     @property
     def published(self) -> Mapping[str, Compared]:
@@ -301,7 +298,7 @@ class ComparisonSchedule:
 
     def _note_compared(self, ends: tuple[MapVersion, MapVersion]) -> None:
         pair = self._pair(*ends)
-        if pair.compared is None or not is_older(ends, pair.compared):
+        if pair.compared is None or not (ends == pair.compared or is_older(ends, pair.compared)):
             pair.compared = ends
 
     def _pair(self, one: RobotMap | MapVersion, another: RobotMap | MapVersion) -> _Pair:

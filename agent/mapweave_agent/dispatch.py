@@ -174,8 +174,7 @@ class Dispatcher:
         self._note(status.robot)
         self._needs.peer(status)
         self._check_map_of(status)
-        held = {(state.robot, state.boot): state.version for state in self._plan.held}
-        newest = held.get((status.robot, status.boot), 0)
+        newest = self._plan.team.current_version_of(status.robot, status.boot) or 0
         self._lacks(status.robot, missing=status.submaps > 0 and newest < status.map_version)
         if status.state == "finished":
             self._plan.peer_finished(status.robot, status.boot, status.map_version)

@@ -4,8 +4,9 @@ No clock and no network in here.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from mapweave_protocol.link.lacking import GRACE, Lacking
 from mapweave_protocol.wire.messages import (
@@ -14,11 +15,13 @@ from mapweave_protocol.wire.messages import (
     MapVersion,
     StatusMessage,
 )
-from mapweave_protocol.wire.pairs import is_older, states_of
+from mapweave_protocol.wire.pairs import Run, is_older, states_of
 
 MAP = "map"
 ARRIVAL = 4.0  # [s] after which what was published is not on its way; Zenoh sends lost ones again
 RETURN = 10.0  # [s] after somebody came, in which it is not waited for so long: links were broken
+
+_ByRuns: TypeAlias = dict[frozenset[Run], tuple[MapVersion, MapVersion]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,15 +99,19 @@ class Needs:
         marks
             The marks of this robot's runs, as published, likewise.
         """
+        if not (self._coordinators or self._peers):
+            return Missing()
         coordinators = {f"coordinator {b}": s.maps for b, s in self._coordinators.items()}
         held = coordinators | {f"{s.robot} {b}": s.holds for b, s in self._peers.items()}
         # All are asked, so that each one's time runs.
         sent = own is not None and self._had_time(MAP, now)
         lacks = [sent and self._lacks_map(who, m, own, now) for who, m in held.items() if own]
+        alignments = {boot: _by_runs(status) for boot, status in self._coordinators.items()}
         missing = tuple(
             message
             for message in found
-            if self._had_time(_pair_of(message), now) and self._lacks_alignments(message, now)
+            if self._had_time(_pair_of(message), now)
+            and self._lacks_alignments(message, alignments, now)
         )
         wanted = [
             run
@@ -137,11 +144,13 @@ class Needs:
         lacks = newest is None or newest < own.version
         return self._lacking.due(f"map {who}", newest, now, lacks=lacks)
 
-    def _lacks_alignments(self, message: AlignmentMessage, now: float) -> bool:
+    def _lacks_alignments(
+        self, message: AlignmentMessage, alignments: Mapping[str, _ByRuns], now: float
+    ) -> bool:
         ours, pair = (message.reference, message.other), _pair_of(message)
         due = False
-        for boot, status in self._coordinators.items():
-            held = _held_of_pair(status, ours)
+        for boot, by_runs in alignments.items():
+            held = by_runs.get(frozenset(states_of(ours)))
             lacks = held is None or is_older(held, ours)
             due |= self._lacking.due(f"alignments {boot} {pair}", held, now, lacks=lacks)
         return due
@@ -151,8 +160,6 @@ def _pair_of(message: AlignmentMessage) -> str:
     return " ".join(f"{end.robot}@{end.boot}" for end in (message.reference, message.other))
 
 
-def _held_of_pair(
-    status: JointStatusMessage, ours: tuple[MapVersion, MapVersion]
-) -> tuple[MapVersion, MapVersion] | None:
-    runs = states_of(ours).keys()
-    return next((ends for ends in status.alignments if states_of(ends).keys() == runs), None)
+def _by_runs(status: JointStatusMessage) -> _ByRuns:
+    """Return of which states of two runs' maps a coordinator has alignments, as said first."""
+    return {frozenset(states_of(ends)): ends for ends in reversed(status.alignments)}

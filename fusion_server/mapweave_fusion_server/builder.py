@@ -11,8 +11,8 @@ from mapweave.team.joining import JointParameters
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.team.joint_optimization import JointOptimizationParameters
 from mapweave_fusion_server.draft import Draft
-from mapweave_protocol.wire.alignment_message import AlignmentPacker
 from mapweave_protocol.wire.codec import encode
+from mapweave_protocol.wire.joint_message import JointPacker
 from mapweave_protocol.wire.messages import JointMapMessage
 
 _log = logging.getLogger(__name__)
@@ -63,7 +63,7 @@ class VersionBuilder:
         self._builder = JointMapBuilder(
             JointParameters.of(config), JointOptimizationParameters.of(config)
         )
-        self._packer = AlignmentPacker()
+        self._packer = JointPacker()
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
         self._future: Future[Built] | None = None
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -71,11 +72,13 @@ class Kept:
     def __init__(self) -> None:
         self.placed: Recent[tuple[LineMap, tuple[int, ...]], Placed] = Recent()
         self.mergings: KnownMergings = Recent()
+        self.joined: Recent[tuple[tuple[Laid, ...], ...], Joined] = Recent()
 
     def turn(self) -> None:
         """Begin another version."""
         self.placed.turn()
         self.mergings.turn()
+        self.joined.turn()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +103,18 @@ class Placed:
     free_space: tuple[FloatArray, ...]
 
 
+class Laid(NamedTuple):
+    """A piece's lines, what they say of walls, and where they lie."""
+
+    lines: LineMap
+    witness: Witness | None
+    placed: Placed
+
+
+Joined: TypeAlias = tuple[LineMap, FloatArray]
+"""Walls, and (n,) how sure each of them is."""
+
+
 def join(
     cluster: Cluster,
     pieces: Mapping[str, Sequence[Piece]],
@@ -112,29 +127,33 @@ def join(
     they are when others are moved, and so does what was made of them.
     """
     kept = kept or Kept()
-    placed = {
-        name: [_placed(piece, frame, p, kept) for piece in pieces[name]]
+    laid = tuple(
+        tuple(
+            Laid(piece.lines, piece.witness, _placed(piece, frame, p, kept))
+            for piece in pieces[name]
+        )
         for name, frame in cluster.poses.items()
-    }
-    together = [each for those in placed.values() for each in those]
-    maps = [piece.lines for name in cluster.poses for piece in pieces[name]]
-    seen = np.concatenate([np.empty((0, 4)), *(each.seen for each in together)])
-    support: IntArray = np.concatenate(
-        [np.empty(0, dtype=np.int64), *(each.support for each in maps)]
     )
-    free = unite([ring for each in together for ring in each.free_space], p.free_space)
-    merged = _merged([[each.walls for each in those] for those in placed.values()], p, kept)
+    # Gone through every time, so that what was merged is kept as well.
+    merged = _merged([[each.placed.walls for each in those] for those in laid], p, kept)
+    lines, sure = kept.joined.get(laid, lambda: _joined(laid, merged, p))
+    return JointComponent(cluster.poses, cluster.confidence, lines, sure)
+
+
+def _joined(laid: Sequence[Sequence[Laid]], merged: FloatArray, p: JointParameters) -> Joined:
+    """Return the walls of all pieces, of which (n, 4) are left when `merged`."""
+    together = [each for those in laid for each in those]
+    seen = np.concatenate([np.empty((0, 4)), *(each.placed.seen for each in together)])
+    support: IntArray = np.concatenate(
+        [np.empty(0, dtype=np.int64), *(each.lines.support for each in together)]
+    )
+    free = unite([ring for each in together for ring in each.placed.free_space], p.free_space)
     lines = _simplified(merged, seen, support, free, p)
     views = [
-        [
-            (piece.witness, each.pose)
-            for piece, each in zip(pieces[name], those, strict=True)
-            if piece.witness is not None
-        ]
-        for name, those in placed.items()
+        [(each.witness, each.placed.pose) for each in those if each.witness is not None]
+        for those in laid
     ]
-    sure = segment_confidence(lines, views, p.segments)
-    return JointComponent(cluster.poses, cluster.confidence, lines, sure)
+    return lines, segment_confidence(lines, views, p.segments)
 
 
 def _placed(piece: Piece, frame: FloatArray, p: JointParameters, kept: Kept) -> Placed:

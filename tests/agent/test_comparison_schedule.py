@@ -395,9 +395,9 @@ def test_what_a_robot_found_that_is_gone_is_told_in_our_name() -> None:
     comparison = first.begin(0.0)
     assert comparison is not None
     second.learned(found(comparison, FIRST))
-    assert second.orphans == []
+    assert list(second.orphans) == []
     second.peer_gone(FIRST, "x")
-    assert second.orphans == [found(comparison, SECOND)]
+    assert list(second.orphans) == [found(comparison, SECOND)]
 
 
 def test_maps_whose_shapes_speak_of_one_place_are_compared_first() -> None:

@@ -1,6 +1,6 @@
 """What a robot sends again, when others say what they hold."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
 import pytest
@@ -135,3 +135,15 @@ def test_a_coordinator_gets_the_maps_of_earlier_runs_too(
         needs.peer(peer(state("a", 7)))
         found = needs.missing(state("a", 7), (), now, [state("a", 3, "before")])
     assert found == Missing(past=missing)
+
+
+def test_while_nobody_speaks_what_was_found_is_not_gone_through() -> None:
+    def unread() -> Iterator[AlignmentMessage]:
+        raise AssertionError("read although nobody has spoken")
+        yield
+
+    needs = Needs("a")
+    assert needs.missing(state("a", 7), unread(), 0.0) == NOTHING
+    needs.coordinator(coordinator())
+    with pytest.raises(AssertionError):
+        needs.missing(state("a", 7), unread(), 1.0)

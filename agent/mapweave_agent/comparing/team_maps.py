@@ -86,6 +86,11 @@ class TeamMaps:
         held = self._robots[robot].maps.get(boot) if robot in self._robots else None
         return None if held is None else held.version
 
+    def current_version_of(self, robot: str, boot: str) -> int | None:
+        """Return the same; None also where the run is neither alive nor the robot's last."""
+        is_current = robot in self._robots and boot in self._robots[robot].current
+        return self.version_of(robot, boot) if is_current else None
+
     def drop(self, robot: str, boot: str) -> None:
         """Drop the map of a run: it was not from it."""
         named = self._robot(robot)

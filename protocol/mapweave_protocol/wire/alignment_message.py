@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.maps import Alignment, Decision, RobotMap, SharedPlace, parse_component
@@ -39,6 +39,9 @@ OF_REASONS = (
 MAX_PLACES = 16
 STEPS = np.array([1e3, 1e3, 1e4])  # a metre, a metre, a radian, as they travel
 CENTIMETRES = 100
+REMEMBERED = 4096  # states of maps, some 0.4 kB each
+
+_told: dict[tuple[object, ...], "MapVersion"] = {}
 
 
 class MapVersion(WireModel):
@@ -47,6 +50,21 @@ class MapVersion(WireModel):
     robot: Id
     boot: Id
     version: Count
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _told_before(cls, fields: object, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Check what was not told before: statuses name hundreds, and mostly the same again."""
+        # True and 1.0 are equal to 1, and no whole numbers.
+        if not isinstance(fields, tuple) or tuple(map(type, fields)) != (str, str, int):
+            return handler(fields)
+        known = _told.get(fields)
+        if isinstance(known, cls):
+            return known
+        if len(_told) >= REMEMBERED:
+            _told.clear()
+        _told[fields] = checked = handler(fields)
+        return checked
 
     @classmethod
     def of(cls, robot_map: RobotMap) -> Self:

@@ -54,38 +54,37 @@ def check_objects(data: bytes, most: int) -> None:
     ValueError
         If it has.
     """
-    left, position, open_containers = most - 1, 0, [1]
-    while open_containers and position < len(data):
-        position, children = _step(data, position)
-        open_containers[-1] -= 1
-        if children > left:
-            raise ValueError(f"more than {most} objects")
-        left -= children
+    left, position, end = most - 1, 0, len(data)
+    here, around = 1, list[int]()  # objects to come in the container, and in those around it
+    while position < end:
+        size, children = _PLAIN[data[position]]
+        if size:  # most of what a message holds
+            position += size
+        else:
+            position, children = _step(data, position)
+        here -= 1
         if children:
-            open_containers.append(children)
-            if len(open_containers) > MAX_DEPTH + 1:
+            if children > left:
+                raise ValueError(f"more than {most} objects")
+            left -= children
+            around.append(here)
+            here = children
+            if len(around) > MAX_DEPTH:
                 raise ValueError(f"more than {MAX_DEPTH} arrays and maps in each other")
-        while open_containers and not open_containers[-1]:
-            open_containers.pop()
+        while not here:
+            if not around:
+                return
+            here = around.pop()
 
 
 def _step(data: bytes, position: int) -> tuple[int, int]:
-    """Return where the next object begins, and how many this one holds."""
+    """Return where the next object begins, and how many this one holds, by the count it tells."""
     first = data[position]
-    if first < 0x80 or first >= 0xE0:
-        return position + 1, 0
-    if first < 0xA0:  # small maps and arrays
-        count = first & 0x0F
-        return position + 1, 2 * count if first < 0x90 else count
-    if first < 0xC0:  # short texts
-        return position + 1 + (first & 0x1F), 0
     if first in _COUNTED:
         size, width = _COUNTED[first]
         return position + 1 + width + size + _number(data, position + 1, width), 0
-    if first in _CONTAINERS:
-        width, parts = _CONTAINERS[first]
-        return position + 1 + width, parts * _number(data, position + 1, width)
-    return position + 1 + _FIXED.get(first, 0), 0
+    width, parts = _CONTAINERS[first]
+    return position + 1 + width, parts * _number(data, position + 1, width)
 
 
 # Bytes after those that tell the length, and how many these are: bin, ext, str.
@@ -101,6 +100,23 @@ _FIXED = {
     0xCA: 4, 0xCB: 8, 0xCC: 1, 0xCD: 2, 0xCE: 4, 0xCF: 8, 0xD0: 1, 0xD1: 2, 0xD2: 4, 0xD3: 8,
     0xD4: 2, 0xD5: 3, 0xD6: 5, 0xD7: 9, 0xD8: 17,
 }  # fmt: skip
+
+
+def _plain(first: int) -> tuple[int, int]:
+    """Return how many bytes an object takes that begins with `first`, and how many it holds.
+
+    No bytes where a count that follows tells.
+    """
+    if first in _COUNTED or first in _CONTAINERS:
+        return 0, 0
+    if 0x80 <= first < 0xA0:  # small maps and arrays, whose parts follow
+        return 1, (first & 0x0F) * (2 if first < 0x90 else 1)
+    if 0xA0 <= first < 0xC0:  # short texts
+        return 1 + (first & 0x1F), 0
+    return 1 + _FIXED.get(first, 0), 0
+
+
+_PLAIN = tuple(map(_plain, range(256)))
 
 
 def _number(data: bytes, position: int, width: int) -> int:

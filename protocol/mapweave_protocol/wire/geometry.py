@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
 from typing import Self
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -177,8 +178,14 @@ class PackedSubmap:
         return Submap(self.id, 0, np.zeros(3), lines, self.trajectory.restore(SUBMAP_REACH))
 
 
+_held: WeakValueDictionary[tuple[int, bytes], PackedSubmap] = WeakValueDictionary()
+
+
 def decode_submaps(decoder: Coder) -> Iterator[PackedSubmap]:
     """Yield the submaps that `SubmapStream` encoded.
+
+    One that is held here already, as of the message before, is the same object: it is not restored
+    and checked again.
 
     Raises
     ------
@@ -189,7 +196,8 @@ def decode_submaps(decoder: Coder) -> Iterator[PackedSubmap]:
     for _ in range(MAX_SUBMAPS + 1):
         if not decoder.bit(ANOTHER):
             return
-        yield PackedSubmap.code(decoder, None, clock)
+        packed = PackedSubmap.code(decoder, None, clock)
+        yield _held.setdefault((packed.id, packed.digest), packed)
     raise ValueError(f"more than {MAX_SUBMAPS} submaps")
 
 

@@ -7,7 +7,9 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
-from mapweave.maps import JointComponent, JointMap
+from mapweave.geometry.arrays import FloatArray
+from mapweave.maps import JointComponent, JointMap, LineMap
+from mapweave.team.recent import Recent
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.alignment_message import AlignmentPacker, WireAlignment
 from mapweave_protocol.wire.budget import MIB, Budget
@@ -52,14 +54,13 @@ class WireComponent(WireModel):
     before: ComponentName | None = None
 
     @classmethod
-    def pack(cls, component: JointComponent) -> Self:
-        """Return `component` for the wire."""
-        lines = PackedLines.pack(component.map, JOINT_REACH, component.segment_confidence)
-        lines.check(JOINT_REACH)
+    def pack(cls, component: JointComponent, packer: "JointPacker | None" = None) -> Self:
+        """Return `component` for the wire; its lines are packed by `packer`, if that is given."""
+        lines, stream = (packer or JointPacker()).lines(component)
         fields = {
             "robots": {name: to_transform(pose) for name, pose in component.robots.items()},
             "confidence": round(float(component.confidence), 4),
-            "stream": _encoded(lines),
+            "stream": stream,
             "marks": tuple(WirePlacedMark.pack(mark) for mark in component.marks),
         }
         # What was packed here is in order, and need not be decoded to see it.
@@ -160,19 +161,21 @@ class JointMapMessage(Message):
     )
 
     @classmethod
-    def pack(cls, joint: JointMap, series: str, packer: AlignmentPacker | None = None) -> Self:
+    def pack(cls, joint: JointMap, series: str, packer: "JointPacker | None" = None) -> Self:
         """Return `joint` as the message of a version of `series`.
 
         Parameters
         ----------
         packer
-            Packed the alignments of the version before; None packs all.
+            Packed the version before; None packs all.
         """
+        packer = packer or JointPacker()
+        packer.turn()
         return cls(
             series=series,
             version=joint.version,
-            components=tuple(WireComponent.pack(component) for component in joint.components),
-            alignments=(packer or AlignmentPacker()).pack(joint.alignments),
+            components=tuple(WireComponent.pack(each, packer) for each in joint.components),
+            alignments=packer.alignments.pack(joint.alignments),
             orders=tuple(WireOrder.pack(order) for order in joint.orders),
         )
 
@@ -248,6 +251,41 @@ class JointMapMessage(Message):
     def _check_follows(self, before: Self) -> None:
         if not self.follows(before):
             raise ValueError(f"expected version {self.version - 1} of {self.series} before it")
+
+
+class JointPacker:
+    """Packs one version after the other, what changed anew.
+
+    Attributes
+    ----------
+    alignments
+        Packs those.
+    """
+
+    def __init__(self) -> None:
+        self.alignments = AlignmentPacker()
+        self._lines: Recent[tuple[LineMap, int], tuple[PackedLines, bytes, FloatArray]] = Recent()
+
+    def turn(self) -> None:
+        """Begin another version."""
+        self._lines.turn()
+
+    def lines(self, component: JointComponent) -> tuple[PackedLines, bytes]:
+        """Return the lines of `component` with their confidence, packed, and the stream of them.
+
+        Raises
+        ------
+        ValueError
+            If a coordinate is not finite, or too far out.
+        """
+        sure = component.segment_confidence
+
+        def pack() -> tuple[PackedLines, bytes, FloatArray]:
+            lines = PackedLines.pack(component.map, JOINT_REACH, sure)
+            lines.check(JOINT_REACH)
+            return lines, _encoded(lines), sure  # kept, so that nothing else has its id
+
+        return self._lines.get((component.map, id(sure)), pack)[:2]
 
 
 def _encoded(lines: PackedLines) -> bytes:

@@ -55,15 +55,24 @@ class WireModel(BaseModel):
     def _of_values(cls, fields: object) -> object:
         if not isinstance(fields, tuple):
             return fields
-        if len(fields) > len(cls.model_fields):
-            raise ValueError(f"{len(fields)} values, expected at most {len(cls.model_fields)}")
-        return {
-            name: by_name(cls.placed[name], value) if name in cls.placed else value
-            for name, value in zip(cls.model_fields, fields, strict=False)
-        }
+        if len(fields) > len(cls.names):
+            raise ValueError(f"{len(fields)} values, expected at most {len(cls.names)}")
+        named = dict(zip(cls.names, fields, strict=False))
+        for name in cls.placed.keys() & named.keys():
+            named[name] = by_name(cls.placed[name], named[name])
+        return named
 
     placed: ClassVar[Mapping[str, Sequence[str]]] = {}
     """By field that is a dictionary, the names in it that need not travel."""
+
+    names: ClassVar[tuple[str, ...]] = ()
+    """Of the fields, in their order: a message is hundreds of models, and asking takes longer."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: object) -> None:
+        """Note the names of the fields of a model that is defined."""
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.names = tuple(cls.model_fields)
 
     def values(self) -> tuple[object, ...]:
         """Return the values of the fields, in their order, as they travel."""

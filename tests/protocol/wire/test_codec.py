@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap, Trajectory
 from mapweave.reasons import Reason, ReasonKind
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler
+from mapweave_protocol.wire import alignment_message
 from mapweave_protocol.wire.codec import DEFLATED, PLAIN, decode, encode
 from mapweave_protocol.wire.joint_status_message import Place
 from mapweave_protocol.wire.messages import (
@@ -366,3 +368,17 @@ def test_a_reason_that_would_move_the_cursor_is_refused() -> None:
     fields["alignments"][0]["cause"] = {"kind": "words", "numbers": {}, "text": "\x1b[2J"}
     with pytest.raises(MessageError, match="printable"):
         decode(AlignmentMessage, envelope(alignments(), msgpack.packb(fields)))
+
+
+@pytest.mark.parametrize("version", [True, 1.0, -1, "1"])
+def test_a_state_told_before_lets_nothing_pass_that_only_equals_it(version: object) -> None:
+    told = ("r1", "boot", 1)
+    assert MapVersion.model_validate(told) is MapVersion.model_validate(told)
+    with pytest.raises(ValidationError):
+        MapVersion.model_validate(("r1", "boot", version))
+
+
+def test_of_states_told_no_more_are_remembered_than_so_many() -> None:
+    for version in range(2 * alignment_message.REMEMBERED):
+        assert MapVersion.model_validate(("r1", "boot", version)).version == version
+        assert len(alignment_message._told) <= alignment_message.REMEMBERED

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,3 +139,28 @@ def test_a_map_of_more_wall_than_any_robot_maps_is_refused(
         forged = encode(MapMessage.pack(a_map_of(60)))
     with pytest.raises(MessageError, match="m of wall"):
         decode(MapMessage, forged)
+
+
+def test_a_submap_that_is_held_is_the_same_object_in_the_next_message(
+    random_map: Callable[..., RobotMap],
+) -> None:
+    payload = encode(MapMessage.pack(random_map(3)))
+    held, again = decode(MapMessage, payload), decode(MapMessage, payload)
+    assert len(held.changes.submaps) > 0
+    for one, another in zip(held.changes.submaps, again.changes.submaps, strict=True):
+        assert one is another
+
+
+def test_submaps_that_differ_by_a_number_are_not_taken_for_each_other(
+    random_map: Callable[..., RobotMap],
+) -> None:
+    robot_map = random_map(3)
+    held = decode(MapMessage, encode(MapMessage.pack(robot_map)))
+    last = robot_map.submaps[-1]
+    poses = last.trajectory.pose + np.array([1.0, 0.0, 0.0])
+    moved = replace(last, trajectory=replace(last.trajectory, pose=poses))
+    changed = replace(robot_map, submaps=(*robot_map.submaps[:-1], moved))
+    arrived = decode(MapMessage, encode(MapMessage.pack(changed)))
+    there = held.changes.submaps[-1].restored.trajectory.pose
+    here = arrived.changes.submaps[-1].restored.trajectory.pose
+    assert len(here) > 0 and np.allclose(here[:, 0] - there[:, 0], 1.0, atol=0.03)

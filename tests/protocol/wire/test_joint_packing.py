@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from mapweave.evidence import Evidence
-from mapweave.maps import Alignment, JointMap, SharedPlace
+from mapweave.maps import Alignment, JointMap, LineMap, SharedPlace
 from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave_protocol.wire import geometry
 from mapweave_protocol.wire.alignment_message import AlignmentPacker
 from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.joint_message import JointPacker
 from mapweave_protocol.wire.messages import JointMapMessage
 
 MakeJoint = Callable[..., JointMap]
@@ -81,3 +82,24 @@ def test_a_copy_with_another_value_travels_with_it() -> None:
     [wire] = AlignmentPacker().pack([FIRST])
     assert wire.values()[4] == 0.9
     assert wire.model_copy(update={"confidence": 0.5}).values()[4] == 0.5
+
+
+def test_lines_that_stay_are_packed_once_and_what_changes_of_them_anew(
+    random_joint: MakeJoint,
+) -> None:
+    joint, packer = random_joint(3), JointPacker()
+    before = JointMapMessage.pack(joint, "s1", packer)
+    first = joint.components[0]
+    other = replace(first, segment_confidence=first.segment_confidence * 0.5)
+    poses = {name: pose + 1.0 for name, pose in first.robots.items()}
+    for changed in (
+        first,
+        replace(first, robots=poses),
+        other,
+        replace(first, map=LineMap.empty(), segment_confidence=np.empty(0)),
+    ):
+        version = replace(joint, components=(changed, *joint.components[1:]))
+        after = JointMapMessage.pack(version, "s1", packer)
+        assert after == JointMapMessage.pack(version, "s1")
+        same = changed.map is first.map and changed is not other
+        assert (after.components[0].lines is before.components[0].lines) == same
