@@ -125,7 +125,7 @@ class Backend:
     def __init__(self, parameters: BackendParameters, known: Sequence[Submap] = ()) -> None:
         self._parameters = parameters
         self._submaps = list(known)
-        self._component_merger = ComponentMerger(parameters.component_merging)
+        self._component_merger = ComponentMerger(parameters.component_merging, len(known))
         self._fragments = FragmentFinder(parameters.fragments)
         self._loops = LoopCloser(parameters.loops)
         self._loops.graph.take_over(known)

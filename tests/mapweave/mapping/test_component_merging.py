@@ -15,6 +15,7 @@ from mapweave.mapping.component_merging import (
     ComponentMergingParameters,
     _covering,
 )
+from mapweave.mapping.localization.gaps import GapParameters
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.matching.verification import Verdict
 from mapweave.reasons import Reason
@@ -136,7 +137,7 @@ def test_however_many_components_there_are_few_are_compared_at_once_and_all_in_t
         return Alignment("older", "younger", np.zeros(3), "refused", 0.0, Reason.words("so"))
 
     monkeypatch.setattr("mapweave.mapping.component_merging.compare", refuse)
-    monkeypatch.setattr("mapweave.mapping.component_merging._between_them", lambda *_: np.empty(0))
+    monkeypatch.setattr("mapweave.mapping.component_merging.between_them", lambda *_: np.empty(0))
     lines = part(OTHER_BUILDING, 0, 26)
     pieces = [submap(k, k, random_pose(rng), lines) for k in range(8)]
     component_merging = ComponentMerger()
@@ -167,7 +168,7 @@ def broken(parts: list[LineMap], gap: FloatArray) -> list[Submap]:
 
 def by_shape_alone() -> ComponentMerger:
     """Return one that looks nowhere in particular."""
-    return ComponentMerger(ComponentMergingParameters(max_reach=0.01))
+    return ComponentMerger(ComponentMergingParameters(gaps=GapParameters(max_reach=0.01)))
 
 
 def trajectory(pose: FloatArray) -> Trajectory:
