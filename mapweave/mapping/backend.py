@@ -160,6 +160,8 @@ class Backend:
         if at is not None:
             parts = _cut(finished, at, self._parameters.submap)
             submaps = self._departed(submaps, at, [part.submap for part in parts])
+            jumped = submaps[-1] if len(parts) == 2 else submaps[at.submap]
+            self._component_merger.note_jump(int(jumped.trajectory.scan_index[0]))
             self._tracked = submaps[-1].id - at.submap + 1 if len(parts) == 1 else 1
         submaps, joints = self._joined(submaps, parts)
         for older, younger in joints:

@@ -128,6 +128,10 @@ class ComponentMerger:
         """Rely on no frame that it remembers, as when components were joined by others."""
         self._place_recognizer.forget()
 
+    def note_jump(self, scan: int) -> None:
+        """Note that what was mapped shows a jump: from number `scan` on it was elsewhere."""
+        self._leap_judge.note_jump(scan)
+
     def _recognised(
         self, submaps: list[Submap], tracked: int
     ) -> tuple[list[Submap], list[tuple[int, int]]]:

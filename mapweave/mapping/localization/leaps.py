@@ -52,6 +52,11 @@ class LeapJudge:
     def __init__(self, parameters: LeapParameters, known: int = 0) -> None:
         self._p, self._known = parameters, known
         self._held: dict[tuple[int, int], _Held] = {}
+        self._jumps: list[int] = []
+
+    def note_jump(self, scan: int) -> None:
+        """Note that from number `scan` on the robot was elsewhere than tracking had it."""
+        self._jumps.append(scan)
 
     def leaps(self, submaps: Sequence[Submap], pair: tuple[int, int], join: FloatArray) -> bool:
         """Whether the robot leaped from one of a `pair` of components to the other.
@@ -71,6 +76,7 @@ class LeapJudge:
             float(np.hypot(*(one.pose[k] - other.pose[m])[:2]))
             > bent + farthest_way(one, k, other, m, self._p.whereabouts)
             for one, k, other, m in _crossings(first, moved)
+            if not any(one.number[k] < jump <= other.number[m] for jump in self._jumps)
         )
 
     def is_believed(

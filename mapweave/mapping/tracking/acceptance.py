@@ -189,6 +189,23 @@ def is_ambiguous(
     return any(t.value(p.novelty) > least and is_rival(best, t, p) for t in found)
 
 
+def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) -> ScanMatch | None:
+    """Return the best of the poses `found` by what was seen and nothing else, if that tells.
+
+    Not where another pose is worth as much: a look-alike.
+    """
+    p = parameters
+
+    def worth(tracked: ScanMatch) -> float:
+        return tracked.evidence.score + p.novelty * tracked.evidence.novel
+
+    best = max(found, key=worth)
+    if best.evidence.score < p.acceptable:
+        return None
+    alike = (t for t in found if worth(t) > worth(best) - p.lead)
+    return None if any(is_rival(best, t, p) for t in alike) else best
+
+
 def is_rival(best: ScanMatch, other: ScanMatch, parameters: AcceptanceParameters) -> bool:
     """Whether `other` is another pose, not just elsewhere along a direction that is open."""
     return bool(_rivals(best, [other], parameters)) and not _is_slid(best, other, parameters)

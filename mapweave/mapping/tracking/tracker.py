@@ -20,6 +20,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
     ScanMatch,
+    best_by_sight,
     is_acceptable,
     is_ambiguous,
     is_credible,
@@ -149,9 +150,7 @@ class Tracker:
         p = self.parameters.acceptance
         wide = min(max(reach, self.parameters.local_map.search.reach), self.parameters.widest)
         starts = self._local.search(seen.oriented.points, near, np.pi, wide)
-        found = self._aligned(seen, np.vstack([near, starts]))
-        best = max(found, key=lambda t: t.evidence.score + p.novelty * t.evidence.novel)
-        return best if best.evidence.score >= p.acceptable else None
+        return best_by_sight(self._aligned(seen, np.vstack([near, starts])), p)
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
@@ -245,8 +244,7 @@ class Tracker:
     def _beside_others(self, best: ScanMatch, found: list[ScanMatch]) -> ScanMatch:
         """Return the best, with how far it may be off where others are worth about as much."""
         p = self.parameters
-        apart = unsettled(best, found, p.open_novelty, p.acceptance)
-        return replace(best, unsettled=apart) if apart > 0 else best
+        return replace(best, unsettled=unsettled(best, found, p.open_novelty, p.acceptance))
 
     def _slid(self, seen: Observation, best: ScanMatch, found: list[ScanMatch]) -> ScanMatch:
         """Return the best along the direction that is left open, if one is; add it to `found`."""
