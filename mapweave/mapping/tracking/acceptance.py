@@ -51,13 +51,6 @@ class AcceptanceParameters(BaseModel):
     open_direction: float = Field(
         0.1, gt=0, lt=1, description="a direction held less than this share of the other is open"
     )
-    open_lead: float = Field(
-        0.1,
-        ge=0,
-        description="share of the returns by which a remarkable pose along an open direction must"
-        " be worth more than others there, or it may be any of them: of fr079, Intel and CSAIL"
-        " 0.3 % of the scans are not, of look-alike corridors 1.3 %",
-    )
     held: float = Field(
         2.5, gt=0, description="points that hold a pose in every direction, after a miss"
     )
@@ -227,7 +220,7 @@ def unsettled(
     p = parameters
     if best.surprise <= p.remarkable or not _is_open(best, p):
         return 0.0
-    least = best.value(novelty) - p.open_lead
+    least = best.value(novelty) - p.lead
     alike = [t for t in _rivals(best, found, p) if t.value(novelty) > least]
     return max((_apart(best, t) for t in alike if _is_slid(best, t, p)), default=0.0)
 
