@@ -125,7 +125,7 @@ class Backend:
     def __init__(self, parameters: BackendParameters, known: Sequence[Submap] = ()) -> None:
         self._parameters = parameters
         self._submaps = list(known)
-        self._component_merger = ComponentMerger(parameters.component_merging)
+        self._component_merger = ComponentMerger(parameters.component_merging, len(known))
         self._fragments = FragmentFinder(parameters.fragments)
         self._loops = LoopCloser(parameters.loops)
         self._loops.graph.take_over(known)
@@ -160,6 +160,8 @@ class Backend:
         if at is not None:
             parts = _cut(finished, at, self._parameters.submap)
             submaps = self._departed(submaps, at, [part.submap for part in parts])
+            jumped = submaps[-1] if len(parts) == 2 else submaps[at.submap]
+            self._component_merger.note_jump(int(jumped.trajectory.scan_index[0]))
             self._tracked = submaps[-1].id - at.submap + 1 if len(parts) == 1 else 1
         submaps, joints = self._joined(submaps, parts)
         for older, younger in joints:

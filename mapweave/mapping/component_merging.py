@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from heapq import nlargest
-from itertools import groupby, pairwise
 
 import numpy as np
 from pydantic import Field
@@ -20,6 +19,8 @@ from mapweave.fusion.decision import DecisionParameters
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
+from mapweave.mapping.localization.gaps import GapParameters, between_them
+from mapweave.mapping.localization.leaps import LeapJudge, LeapParameters
 from mapweave.mapping.place_recognition import PlaceRecognitionParameters, PlaceRecognizer
 from mapweave.maps import Alignment, LineMap, Submap, lines_of
 from mapweave.matching.common_lines import count_common_lines
@@ -38,6 +39,8 @@ class ComponentMergingParameters(StageParameters):
         )
     )
     place_recognition: PlaceRecognitionParameters = derived(PlaceRecognitionParameters.of)
+    gaps: GapParameters = derived(GapParameters.of)
+    leaps: LeapParameters = derived(LeapParameters.of)
     min_lines: int = Field(
         3, ge=1, description="straight lines in common: one corner of a hall is like the next"
     )
@@ -54,27 +57,12 @@ class ComponentMergingParameters(StageParameters):
     growth: float = Field(
         0.15, gt=0, description="share by which either has grown before a pair is compared again"
     )
-    reach: float = derived(
-        lambda c: 1.5 * c.robot.max_speed,
-        gt=0,
-        description="[m] that a robot came while it was lost, at most",
-    )
-    max_reach: float = derived(
-        lambda c: 3.75 * c.robot.max_speed,
-        gt=0,
-        description="[m] the same with a piece in between, its path included",
-    )
-    gaps: int = Field(
-        2, ge=1, description="between two components where it is looked for, the last"
-    )
     comparisons: int = Field(
         4, ge=1, description="of components, when a submap is finished; others wait for the next"
     )
     waiting: int = Field(
         500, ge=1, description="pairs that may wait; more are asked when one of them has grown"
     )
-    step: float = Field(0.3, gt=0, description="[m] between the places tried there")
-    turn_step: float = Field(0.06, gt=0, description="[rad] between the headings tried there")
     place: float = Field(2.0, gt=0, description="[m] within which the middles of submaps are alike")
     visits: int = Field(
         3, ge=1, description="submaps of a place that are compared, the last; more tell little more"
@@ -82,15 +70,21 @@ class ComponentMergingParameters(StageParameters):
 
 
 class ComponentMerger:
-    """Remembers what it compared: a pair that was refused is asked again when it has grown."""
+    """Remembers what it compared: a pair that was refused is asked again when it has grown.
 
-    def __init__(self, parameters: ComponentMergingParameters | None = None) -> None:
+    The first `known` submaps are of earlier runs.
+    """
+
+    def __init__(
+        self, parameters: ComponentMergingParameters | None = None, known: int = 0
+    ) -> None:
         self._p = parameters or ComponentMergingParameters()
         self._compared: dict[tuple[int, int], tuple[float, float]] = {}  # [m] of wall, then
         self._walls: dict[int, float] = {}  # [m] in each component, the last time
         self._due: set[tuple[int, int]] = set()
         self._shapes: dict[int, tuple[object, PreparedMap | None]] = {}
         self._place_recognizer = PlaceRecognizer(self._p.place_recognition, self._p.fusion)
+        self._leap_judge = LeapJudge(self._p.leaps, known)
 
     def reunite(
         self, submaps: Sequence[Submap], tracked: int = 1
@@ -134,6 +128,10 @@ class ComponentMerger:
         """Rely on no frame that it remembers, as when components were joined by others."""
         self._place_recognizer.forget()
 
+    def note_jump(self, scan: int) -> None:
+        """Note that what was mapped shows a jump: from number `scan` on it was elsewhere."""
+        self._leap_judge.note_jump(scan)
+
     def _recognised(
         self, submaps: list[Submap], tracked: int
     ) -> tuple[list[Submap], list[tuple[int, int]]]:
@@ -144,6 +142,8 @@ class ComponentMerger:
             return submaps, []
         newest = submaps[-1]
         here, there = newest.component, found.component
+        if self._leap_judge.leaps(submaps, (there, here), found.transform):
+            return submaps, []  # where it was carried to is found by its shape
         if here < there:
             joined = self._moved(submaps, here, there, se2.inverse(found.transform))
         else:
@@ -198,7 +198,20 @@ class ComponentMerger:
         shapes = self._shape(submaps, older), self._shape(submaps, younger)
         if alignment.decision != "accepted" or not self._tells(*shapes, alignment.transform):
             return None
+        if self._is_far_fetched(submaps, (older, younger), alignment):
+            return None
         return self._moved(submaps, older, younger, alignment.transform)
+
+    def _is_far_fetched(
+        self, submaps: Sequence[Submap], pair: tuple[int, int], alignment: Alignment
+    ) -> bool:
+        """Whether the robot would have leaped, and what it saw since does not say so as well."""
+        join, second = alignment.transform, self._shape(submaps, pair[1])
+        if second is None or not self._leap_judge.leaps(submaps, pair, join):
+            return False
+        middle = second.raster.oriented.points.mean(axis=0)
+        common = alignment.evidence.common or 0.0
+        return not self._leap_judge.is_believed(pair, join, common, middle)
 
     def _tells(
         self, first: PreparedMap | None, second: PreparedMap | None, transform: FloatArray
@@ -215,8 +228,11 @@ class ComponentMerger:
         first, second = self._shape(submaps, older), self._shape(submaps, younger)
         names, p = ("older", "younger"), self._p
         anywhere = compare(names[0], first, names[1], second, p.fusion, closely=True)
-        possible = _between_them(submaps, older, younger, p)
-        if anywhere.decision == "accepted" or len(possible) == 0:
+        accepted = anywhere.decision == "accepted"
+        if accepted and not self._leap_judge.leaps(submaps, (older, younger), anywhere.transform):
+            return anywhere
+        possible = between_them(submaps, older, younger, p.gaps)
+        if len(possible) == 0:
             return anywhere
         proof = {"min_confidence": p.min_confidence, "min_lead": p.min_lead}
         # Where track was lost, the room that is there is the same room.
@@ -261,54 +277,6 @@ def _covering(inside: Sequence[Submap], p: ComponentMergingParameters) -> list[S
         if sum(math.dist(middle, other) < p.place for _, other in kept) < p.visits:
             kept.append((submap, middle))
     return [submap for submap, _ in reversed(kept)]
-
-
-def _between_them(
-    submaps: Sequence[Submap], older: int, younger: int, p: ComponentMergingParameters
-) -> FloatArray:
-    """(n, 3) transforms from `younger` to `older` by which the robot did not leap between them.
-
-    Wherever one ended and the other is the next of the two, the last times; what it saw meanwhile
-    may be in a piece too small to be joined.
-    """
-    seen = [
-        (k, s)
-        for k, s in enumerate(submaps)
-        if s.component in (older, younger) and len(s.trajectory.pose)
-    ]
-    gaps = [(a, b) for a, b in pairwise(seen) if a[1].component != b[1].component]
-    found = [np.empty((0, 3))]
-    for (k, before), (m, after) in gaps[-p.gaps :]:
-        moves = _moves(_lost_for(submaps[k + 1 : m], p), p)
-        last, first = _pose(before, -1), _pose(after, 0)
-        if before.component == older:
-            found.append(se2.compose(se2.compose(last, moves), se2.inverse(first)))
-        else:
-            found.append(se2.compose(first, se2.compose(se2.inverse(moves), se2.inverse(last))))
-    return np.concatenate(found)
-
-
-def _lost_for(pieces: Sequence[Submap], p: ComponentMergingParameters) -> float:
-    """[m] that a robot may have come while it was lost, these pieces of its path included."""
-    count = len(list(groupby(pieces, lambda s: s.component)))
-    return p.reach * (1 + count) + sum(s.trajectory.length for s in pieces)
-
-
-def _moves(reach: float, p: ComponentMergingParameters) -> FloatArray:
-    """(n, 3) all moves of a robot that came no farther than `reach` [m, m, rad]; none beyond it."""
-    if reach > p.max_reach:
-        return np.empty((0, 3))
-    shifts = np.linspace(-reach, reach, 2 * int(np.ceil(reach / p.step)) + 1)
-    turns = np.arange(-np.pi, np.pi, p.turn_step)
-    x, y, turn = (a.ravel() for a in np.meshgrid(shifts, shifts, turns, indexing="ij"))
-    within = np.hypot(x, y) <= reach
-    moves: FloatArray = np.column_stack([x, y, turn])[within]
-    return moves
-
-
-def _pose(submap: Submap, scan: int) -> FloatArray:
-    """(3,) of one of the scans of a submap, component frame [m, m, rad]."""
-    return se2.compose(submap.pose, submap.trajectory.pose[scan])
 
 
 def _nearest(submaps: Sequence[Submap], component: int, younger: set[int]) -> tuple[int, int]:

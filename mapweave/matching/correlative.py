@@ -34,6 +34,15 @@ class CorrelativeParameters(StageParameters):
     turn_step: float = Field(0.052, gt=0, description="[rad] between rotations: 3 degrees")
     max_points: int = Field(120, ge=10, description="scan points that vote")
     candidates: int = Field(6, ge=1, description="how many different maxima are handed on")
+    most_candidates: int = Field(30, ge=1, description="of a window that is wider than usual")
+
+    def candidates_in(self, reach: float) -> int:
+        """Return how many maxima of a window of `reach` [m] are handed on: as many to its area.
+
+        A wider one has more look-alikes, which crowd out the true pose.
+        """
+        many = round(self.candidates * max(1.0, reach / self.reach) ** 2)
+        return min(many, max(self.candidates, self.most_candidates))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -135,13 +135,27 @@ class Whereabouts:
 
     def _most(self, lost: Path, own: int, known: Path, theirs: int) -> tuple[float, float]:
         """How far [m] and turned [rad] it can have come from one scan to the other."""
-        p, scans = self._p, abs(int(lost.number[own] - known.number[theirs]))
-        way = p.slack + scans * _longer_step(known, p)
-        told = abs(float(lost.stamp[own] - known.stamp[theirs]))
-        time = max(known.interval * scans, told if math.isfinite(told) else 0.0)
-        if time <= 0:
-            return way, math.pi
-        return min(way, p.slack + p.max_speed * time), p.turn_slack + p.max_turn_rate * time
+        p = self._p
+        time = _time(lost, own, known, theirs)
+        turn = p.turn_slack + p.max_turn_rate * time if time > 0 else math.pi
+        return farthest_way(known, theirs, lost, own, p), turn
+
+
+def farthest_way(known: Path, theirs: int, lost: Path, own: int, p: WhereaboutsParameters) -> float:
+    """How far [m] a robot can have come between two scans, by their places in two paths.
+
+    The `known` path tells its pace, and stamps the time.
+    """
+    scans = max(abs(int(lost.number[own] - known.number[theirs])), 1)
+    way, time = p.slack + scans * _longer_step(known, p), _time(lost, own, known, theirs)
+    return min(way, p.slack + p.max_speed * time) if time > 0 else way
+
+
+def _time(lost: Path, own: int, known: Path, theirs: int) -> float:
+    """[s] between two scans, the longest that there is evidence for; 0 where there is none."""
+    told = abs(float(lost.stamp[own] - known.stamp[theirs]))
+    counted = known.interval * abs(int(lost.number[own] - known.number[theirs]))
+    return max(counted, told if math.isfinite(told) else 0.0)
 
 
 def _longer_step(known: Path, p: WhereaboutsParameters) -> float:

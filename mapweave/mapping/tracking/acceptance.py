@@ -75,6 +75,8 @@ class ScanMatch:
         How unlikely the step to it is, for this robot and for any; see `MotionModel`.
     drift
         (3, 3) covariance of the robot's pose, by what nothing held before; see `Drift`.
+    unsettled
+        [m] along the direction that its walls leave open, to the farthest pose worth about as much.
     """
 
     pose: FloatArray
@@ -83,6 +85,7 @@ class ScanMatch:
     surprise: float = 0.0
     leap: float = 0.0
     drift: FloatArray = field(default_factory=lambda: NO_DRIFT)
+    unsettled: float = 0.0
 
     def value(self, novelty: float) -> float:
         """Evidence less surprise: corridors leave a direction open, and speed is bounded."""
@@ -179,19 +182,66 @@ def is_ambiguous(
     return any(t.value(p.novelty) > least and is_rival(best, t, p) for t in found)
 
 
+def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) -> ScanMatch | None:
+    """Return the best of the poses `found` by what was seen and nothing else, if that tells.
+
+    Not where another pose is worth as much: a look-alike.
+    """
+    p = parameters
+
+    def worth(tracked: ScanMatch) -> float:
+        return tracked.evidence.score + p.novelty * tracked.evidence.novel
+
+    best = max(found, key=worth)
+    if best.evidence.score < p.acceptable:
+        return None
+    alike = (t for t in found if worth(t) > worth(best) - p.lead)
+    return None if any(is_rival(best, t, p) for t in alike) else best
+
+
 def is_rival(best: ScanMatch, other: ScanMatch, parameters: AcceptanceParameters) -> bool:
     """Whether `other` is another pose, not just elsewhere along a direction that is open."""
     return bool(_rivals(best, [other], parameters)) and not _is_slid(best, other, parameters)
 
 
+def unsettled(
+    best: ScanMatch, found: Sequence[ScanMatch], novelty: float, parameters: AcceptanceParameters
+) -> float:
+    """Return how far [m] from the best, along an open direction, another is worth about as much.
+
+    As in a corridor with a door every two metres: the next one fits nearly as well. Where it is as
+    expected, the pace has told these apart.
+
+    Parameters
+    ----------
+    novelty
+        What a return at a new place counts there.
+    """
+    p = parameters
+    if best.surprise <= p.remarkable or not _is_open(best, p):
+        return 0.0
+    least = best.value(novelty) - p.lead
+    alike = [t for t in _rivals(best, found, p) if t.value(novelty) > least]
+    return max((_apart(best, t) for t in alike if _is_slid(best, t, p)), default=0.0)
+
+
+def _is_open(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
+    """Whether its walls leave a direction open."""
+    held = ellipse(tracked.information)
+    return held.least <= p.open_direction * held.most
+
+
 def _is_slid(best: ScanMatch, other: ScanMatch, p: AcceptanceParameters) -> bool:
-    """Whether `other` is `best`, but for how far along an open direction it is, or half a turn."""
-    held = ellipse(best.information)
-    half_turns = 2 * float(se2.wrap(other.pose[2] - best.pose[2]))
-    if held.least > p.open_direction * held.most or abs(se2.wrap(half_turns)) > 2 * p.rival_turn:
+    """Whether `other` is `best`, but for how far along an open direction it is."""
+    if not _is_open(best, p) or abs(se2.wrap(other.pose[2] - best.pose[2])) > p.rival_turn:
         return False
     across = np.linalg.eigh(best.information[:2, :2])[1][:, 1]
     return bool(abs(across @ (other.pose - best.pose)[:2]) <= p.rival_distance)
+
+
+def _apart(one: ScanMatch, other: ScanMatch) -> float:
+    """[m] between two poses."""
+    return float(np.hypot(*(one.pose - other.pose)[:2]))
 
 
 def _is_held(tracked: ScanMatch, p: AcceptanceParameters) -> bool:

@@ -130,6 +130,7 @@ class Drift:
         seen: OrientedPoints,
         known: Surroundings,
         pace: Pace,
+        unsettled: float = 0.0,
     ) -> bool:
         """Go on to a scan that was found by what is `known`; return whether it drifts.
 
@@ -143,15 +144,31 @@ class Drift:
             (3, 3) of `Fit`.
         seen
             Its points, sensor frame.
+        unsettled
+            [m] along the direction that is held least, to where it may be as well.
         """
         if self.covariance.any():
             carried = np.eye(3)
             carried[:2, 2] = -step[1], step[0]
             self._covariances = carried @ self._covariances @ carried.T
-        self._return(pose, seen, known)
+        if unsettled == 0:  # else what it is held by may be a look-alike
+            self._return(pose, seen, known)
         opened = self._open(pose, information, seen, known)
         self._lately.append(_Opened(known.newest, pace) if opened else None)
-        return self._drift(opened)
+        drifts = self._drift(opened)
+        if unsettled > 0:
+            self._doubt(information, unsettled, known)
+        return drifts or unsettled > 0
+
+    def _doubt(self, information: FloatArray, unsettled: float, known: Surroundings) -> None:
+        """Grow along the direction that is held least: it is here, or so far away as well [m].
+
+        Which of both, does not depend on what it was the last time.
+        """
+        if not self.covariance.any():
+            self._old = known.newest
+        along = np.append(np.linalg.eigh(information[:2, :2])[1][:, 0], 0.0)
+        self._covariances = self._covariances + (unsettled / 2) ** 2 * np.outer(along, along)
 
     def _drift(self, opened: list[FloatArray]) -> bool:
         """Grow along what is `opened`, once most of the scans lately left something open.

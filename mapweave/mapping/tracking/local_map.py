@@ -181,8 +181,8 @@ class LocalMap:
         Its half width is `reach` [m], or the usual one.
         """
         p = self._parameters.search
-        if reach is not None:
-            p = p.model_copy(update={"reach": reach})
+        if reach is not None and reach != p.reach:
+            p = p.model_copy(update={"reach": reach, "candidates": p.candidates_in(reach)})
         return search(points, self._nearness(centre), centre, max_turn, p)
 
     def _nearness(self, centre: FloatArray) -> LikelihoodField:

@@ -20,10 +20,12 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
     ScanMatch,
+    best_by_sight,
     is_acceptable,
     is_ambiguous,
     is_credible,
     tell_apart,
+    unsettled,
 )
 from mapweave.mapping.tracking.drift import Drift
 from mapweave.mapping.tracking.local_map import LocalMap, ScanEvidence
@@ -148,9 +150,7 @@ class Tracker:
         p = self.parameters.acceptance
         wide = min(max(reach, self.parameters.local_map.search.reach), self.parameters.widest)
         starts = self._local.search(seen.oriented.points, near, np.pi, wide)
-        found = self._aligned(seen, np.vstack([near, starts]))
-        best = max(found, key=lambda t: t.evidence.score + p.novelty * t.evidence.novel)
-        return best if best.evidence.score >= p.acceptable else None
+        return best_by_sight(self._aligned(seen, np.vstack([near, starts])), p)
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
@@ -183,6 +183,7 @@ class Tracker:
             self._thinned(seen),
             self._local,
             unknown,
+            tracked.unsettled,
         )
         if not self.missed:
             self._motion.add(step, np.zeros((3, 3)) if is_open else tracked.information)
@@ -222,7 +223,7 @@ class Tracker:
             if best is not None and best.evidence.score >= a.convincing and is_credible(best, a):
                 best = self._slid(seen, best, found)
                 if best.surprise <= a.remarkable:
-                    return best
+                    return self._beside_others(best, found)
                 break
         found += self._reached(seen, self._local.search(points, predicted[0], np.pi, wide))
         return self._best_of_all(seen, found)
@@ -238,7 +239,12 @@ class Tracker:
         elif not is_acceptable(best, self._likely(found, a.novelty), a):
             return None
         turn = float(se2.wrap(best.pose[2] - self.pose[2]))
-        return None if is_ambiguous(best, found, turn, a) else best
+        return None if is_ambiguous(best, found, turn, a) else self._beside_others(best, found)
+
+    def _beside_others(self, best: ScanMatch, found: list[ScanMatch]) -> ScanMatch:
+        """Return the best, with how far it may be off where others are worth about as much."""
+        p = self.parameters
+        return replace(best, unsettled=unsettled(best, found, p.open_novelty, p.acceptance))
 
     def _slid(self, seen: Observation, best: ScanMatch, found: list[ScanMatch]) -> ScanMatch:
         """Return the best along the direction that is left open, if one is; add it to `found`."""

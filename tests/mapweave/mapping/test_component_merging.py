@@ -15,6 +15,7 @@ from mapweave.mapping.component_merging import (
     ComponentMergingParameters,
     _covering,
 )
+from mapweave.mapping.localization.gaps import GapParameters
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.matching.verification import Verdict
 from mapweave.reasons import Reason
@@ -136,7 +137,7 @@ def test_however_many_components_there_are_few_are_compared_at_once_and_all_in_t
         return Alignment("older", "younger", np.zeros(3), "refused", 0.0, Reason.words("so"))
 
     monkeypatch.setattr("mapweave.mapping.component_merging.compare", refuse)
-    monkeypatch.setattr("mapweave.mapping.component_merging._between_them", lambda *_: np.empty(0))
+    monkeypatch.setattr("mapweave.mapping.component_merging.between_them", lambda *_: np.empty(0))
     lines = part(OTHER_BUILDING, 0, 26)
     pieces = [submap(k, k, random_pose(rng), lines) for k in range(8)]
     component_merging = ComponentMerger()
@@ -161,17 +162,19 @@ def broken(parts: list[LineMap], gap: FloatArray) -> list[Submap]:
     after = submap(1, 1, first, parts[1])
     return [
         Submap(0, 0, before.pose, before.map, trajectory(path)),
-        Submap(1, 1, np.zeros(3), after.map, trajectory(np.zeros((1, 3)))),
+        Submap(1, 1, np.zeros(3), after.map, trajectory(np.zeros((1, 3)), 2)),
     ]
 
 
 def by_shape_alone() -> ComponentMerger:
     """Return one that looks nowhere in particular."""
-    return ComponentMerger(ComponentMergingParameters(max_reach=0.01))
+    return ComponentMerger(ComponentMergingParameters(gaps=GapParameters(max_reach=0.01)))
 
 
-def trajectory(pose: FloatArray) -> Trajectory:
-    return Trajectory(np.arange(len(pose)), np.zeros(len(pose)), pose, None)
+def trajectory(pose: FloatArray, first: int = 0) -> Trajectory:
+    """Return a path of scans whose numbers begin with `first`, a second apart."""
+    number = first + np.arange(len(pose))
+    return Trajectory(number, number.astype(float), pose, None)
 
 
 # A corridor with the same two alcoves again 14 m farther on.
@@ -227,8 +230,9 @@ def test_what_was_seen_in_between_in_pieces_does_not_hide_where_track_was_lost(
     parts = [shaken(part(TWINS, 8, 40), rng), shaken(part(TWINS, 12, 22), rng)]
     before, after = broken(parts, np.array([1.8, 0.2, 0.3]))
     path = np.outer(np.arange(2 * steps), [0.5, 0.0, 0.0])
-    piece = Submap(1, 1, np.zeros(3), LineMap.empty(), trajectory(path))
-    after = replace(after, id=2, component=2)
+    piece = Submap(1, 1, np.zeros(3), LineMap.empty(), trajectory(path, 2))
+    end = trajectory(np.zeros((1, 3)), 2 + len(path))
+    after = replace(after, id=2, component=2, trajectory=end)
     assert by_shape_alone().reunite([before, piece, after])[1] == []
     assert ComponentMerger().reunite([before, piece, after])[1] == joint
 
@@ -247,7 +251,7 @@ def test_a_robot_that_was_carried_away_is_not_believed_to_be_where_it_was(rng: G
     before, after = submap(0, 0, np.zeros(3), known), submap(1, 1, there, seen)
     submaps = [
         Submap(0, 0, before.pose, before.map, trajectory(last[None])),
-        Submap(1, 1, np.zeros(3), after.map, trajectory(np.zeros((1, 3)))),
+        Submap(1, 1, np.zeros(3), after.map, trajectory(np.zeros((1, 3)), 1)),
     ]
     assert by_shape_alone().reunite(submaps)[1] == []  # two places are like that
     assert ComponentMerger().reunite(submaps)[1] == []
@@ -269,3 +273,33 @@ def test_within_a_robots_map_straight_walls_join_nothing_however_well_held() -> 
     within, between = ComponentMergingParameters().fusion.decision, FusionParameters().decision
     assert decide(straight, None, 0.99, within)[0] == "ambiguous"
     assert decide(straight, None, 0.99, between)[0] == "accepted"
+
+
+def carried_off(rng: Generator, seen: float) -> list[Submap]:
+    """Return a long corridor as it was mapped, and the end of it, `seen` so far [m].
+
+    The robot was at 4 m when it lost track, and a second later it was at 22 m.
+    """
+    known, after = shaken(part(BUILDING, 0, 30), rng), part(BUILDING, 30 - seen, 30)
+    before = Submap(0, 0, np.zeros(3), known, trajectory(np.array([[4.0, 1.0, 0.0]])))
+    later = submap(1, 1, np.array([22.0, 1.0, 0.0]), after)
+    there = trajectory(np.zeros((1, 3)), 1)
+    return [before, Submap(1, 1, np.zeros(3), later.map, there)]
+
+
+def test_a_join_by_which_the_robot_leaped_is_held_until_what_it_saw_since_agrees(
+    rng: Generator,
+) -> None:
+    """In a building that repeats itself, a look-alike is likelier than that it was carried off."""
+    merger = ComponentMerger()
+    little, more = carried_off(rng, 12.0), carried_off(rng, 30.0)
+    assert merger.reunite(little)[1] == []
+    assert merger.reunite(little)[1] == []  # nothing new agrees
+    joined, joints = merger.reunite(more)
+    assert joints == [(0, 1)]
+    np.testing.assert_allclose(joined[1].pose, [22.0, 1.0, 0.0], atol=0.2)
+
+
+def test_from_one_run_to_another_a_robot_may_be_taken_anywhere(rng: Generator) -> None:
+    submaps = carried_off(rng, 12.0)
+    assert ComponentMerger(known=1).reunite(submaps)[1] == [(0, 1)]

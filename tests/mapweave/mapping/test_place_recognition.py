@@ -27,11 +27,15 @@ LONG = corridor(
 
 
 def component(number: int, first: int, bend: float) -> list[Submap]:
-    """Return the long corridor in five submaps, each turned by `bend` [rad] more than it is."""
+    """Return the long corridor in five submaps, each turned by `bend` [rad] more than it is.
+
+    A robot that was lost for as long as 90 scans may be anywhere in it.
+    """
     pose, submaps = np.array([3.0, -7.0, 0.4 * number]), []
     for k in range(5):
         own = part(LONG, 12 * k, 12 * k + 12).moved(se2.inverse(np.array([12.0 * k, 0, 0])))
-        path = Trajectory(np.arange(2), np.zeros(2), np.array([[0.0, 1, 0], [12.0, 1, 0]]))
+        scans = 100 * number + 2 * k + np.arange(2)
+        path = Trajectory(scans, np.zeros(2), np.array([[0.0, 1, 0], [12.0, 1, 0]]))
         submaps.append(Submap(first + k, number, pose, own, path))
         pose = se2.compose(pose, np.array([12.0, 0, bend]))
     return submaps
@@ -105,3 +109,14 @@ def test_the_robot_that_is_recognised_joins_the_older_component(first: int) -> N
     assert np.hypot(off[0], off[1]) < 0.5 and abs(off[2]) < 0.05
     of_older = [k for k, s in enumerate(submaps) if s.component == 0]
     assert all(joined[k].pose is submaps[k].pose for k in of_older)
+
+
+def test_a_robot_is_not_recognised_where_it_cannot_have_come_to() -> None:
+    """It was lost for one scan, and 57 m lie between the ends of both."""
+    soon = [
+        replace(s, trajectory=replace(s.trajectory, scan_index=s.trajectory.scan_index - 90))
+        for s in YOUNGER
+    ]
+    merger = ComponentMerger(ComponentMergingParameters(place_recognition=P, growth=1e6))
+    results = [merger.reunite([*OLDER, *soon[:count]], tracked=count) for count in (4, 5)]
+    assert [len(joints) for _, joints in results] == [0, 0]

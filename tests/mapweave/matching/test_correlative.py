@@ -60,3 +60,11 @@ def test_nearness_is_one_on_a_surface_and_falls_with_distance_as_a_bell() -> Non
 def test_outside_the_raster_nothing_is_near() -> None:
     raster = LikelihoodField.of(np.array([[0.0, 0.0]]), np.zeros(2), P)
     assert (raster.value[-1] == 0).all() and (raster.value[:, -1] == 0).all()
+
+
+def test_a_wider_window_hands_on_as_many_more_maxima_as_it_is_larger() -> None:
+    """A look-alike to an area: six of them would crowd out the true pose."""
+    p = CorrelativeParameters()
+    assert p.candidates_in(p.reach / 2) == p.candidates_in(p.reach) == p.candidates
+    assert p.candidates_in(2 * p.reach) == 4 * p.candidates
+    assert p.candidates_in(100 * p.reach) == p.most_candidates

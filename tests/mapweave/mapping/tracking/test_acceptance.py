@@ -7,9 +7,11 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.tracking.acceptance import (
     AcceptanceParameters,
     ScanMatch,
+    best_by_sight,
     is_acceptable,
     is_ambiguous,
     tell_apart,
+    unsettled,
 )
 from mapweave.mapping.tracking.local_map import ScanEvidence
 
@@ -106,3 +108,32 @@ def test_what_may_have_come_since_does_not_hide_where_the_robot_is() -> None:
     assert not is_acceptable(blocked, [blocked], P) and tell_apart([blocked], P.novelty, P) == []
     elsewhere = ScanMatch(np.array([2.0, 0.0, 0.0]), people, HELD)
     assert not is_acceptable(among, [among, elsewhere], P)
+
+
+ALONG_Y = np.diag([30.0, 0.2, 50.0])[[1, 0, 2]][:, [1, 0, 2]]  # open along x
+
+
+def test_where_a_step_is_remarkable_it_is_said_how_far_along_it_may_be_instead() -> None:
+    """In a corridor with a door every two metres the next one fits nearly as well."""
+    leap = ScanMatch(np.zeros(3), ScanEvidence(0.8, 0.0, 0.0), ALONG_Y, surprise=0.12, leap=0.06)
+    expected = ScanMatch(np.zeros(3), ScanEvidence(0.8, 0.0, 0.0), ALONG_Y, surprise=0.01)
+    alike = pose(2.0, 0.7, information=ALONG_Y), pose(-0.9, 0.72, information=ALONG_Y)
+    worse = pose(3.0, 0.2, 0.3, information=ALONG_Y)
+    assert unsettled(leap, [leap, *alike, worse], P.novelty, P) == pytest.approx(2.0)
+    assert unsettled(leap, [leap, worse], P.novelty, P) == 0.0
+    assert unsettled(expected, [expected, *alike], P.novelty, P) == 0.0  # the pace tells
+
+
+def test_half_a_turn_is_another_pose_in_a_corridor_too() -> None:
+    turned = ScanMatch(
+        np.array([0.0, 0.0, np.pi]), ScanEvidence(0.85, 0.0, 0.0), np.diag([5.0, 70.0, 9.0]), 0.19
+    )
+    assert not is_ambiguous(turned, [turned, pose(5.0, 0.2, information=ALONG_Y)], np.pi, P)
+    assert is_ambiguous(turned, [turned, pose(5.0, 0.64, information=ALONG_Y)], np.pi, P)
+
+
+def test_a_scan_that_was_missed_is_not_placed_where_two_places_are_alike() -> None:
+    best, other, along = pose(0.0, 0.8), pose(3.0, 0.78), pose(3.0, 0.6)
+    assert best_by_sight([along, best], P) is best
+    assert best_by_sight([best, other], P) is None
+    assert best_by_sight([pose(0.0, 0.3, 0.1)], P) is None

@@ -123,3 +123,14 @@ def test_in_a_round_room_the_heading_is_open_and_in_a_square_one_it_is_not() -> 
     assert mapped(scans_at(round_room, way, 0.1, angles=AROUND))[-1, 2] > 2 * SAID_TURN
     square = mapped(scans_at(walls_of(rectangle(-4, -4, 4, 3.5)), way, 0.1, angles=AROUND))
     assert (square[:, 2] < SAID_TURN).all()
+
+
+def test_a_scan_that_may_be_elsewhere_along_a_wall_may_be_off_by_half_of_that_at_once() -> None:
+    """Until what was mapped before it holds the robot again, and by no more for each other one."""
+    drift, ends = Drift(DriftParameters()), Endless(9, 2.0, known_end=True)
+    drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, ends, PACE, 2.0)
+    np.testing.assert_allclose(drift.covariance, np.diag([1.0, 0.0, 0.0]), atol=1e-9)
+    drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, ends, PACE, 2.0)
+    assert drift.covariance[0, 0] == pytest.approx(2.0)
+    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, ends, PACE)
+    assert np.abs(drift.covariance).max() < 1e-9
