@@ -113,6 +113,8 @@ bench-robots: $(KERNELS)
 bench-shape: $(KERNELS)
 	$(BIN)/python -m benchmarks shape --stretches 3 6
 	$(BIN)/python -m benchmarks scale
+	for part in words correlation similarity; do \
+	  $(BIN)/python -m benchmarks fusion --no-peers --across 0 --without $$part; done
 
 # Which shapes buildings are full of, counted anew in all recordings.
 .PHONY: background

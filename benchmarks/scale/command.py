@@ -11,6 +11,7 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+import scipy
 
 from benchmarks.logs import find_logs
 from benchmarks.scale.driving import Costs, Driven, Pair, drive
@@ -198,11 +199,9 @@ def _lost(joins: Joins) -> int:
 
 def _groups(count: int, pairs: Sequence[Pair]) -> int:
     """How many groups the robots are in that pairs hold together."""
-    group = list(range(count))
-    for a, b in pairs:
-        old, new = group[a], group[b]
-        group = [new if g == old else g for g in group]
-    return len(set(group))
+    i, j = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    graph = scipy.sparse.coo_array((np.ones(len(i)), (i, j)), (count, count))
+    return int(scipy.sparse.csgraph.connected_components(graph, directed=False)[0])
 
 
 def tell(rows: Sequence[Figure]) -> str:

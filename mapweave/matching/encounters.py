@@ -41,24 +41,24 @@ class Encounters:
     def __init__(self, parameters: EncounterParameters | None = None) -> None:
         self._p = parameters or EncounterParameters.of(Config())
         self._index: PlaceIndex[Key] = PlaceIndex(self._p.index)
-        self._walls: dict[Key, float] = {}  # [m] when it was, or is to be, looked up
+        self._walls: dict[Run, dict[int, float]] = {}  # [m] when it was, or is to be, looked up
         self._waiting: dict[Key, Submap] = {}
         self._best: dict[Run, dict[Run, float]] = {}  # both ways
 
     def take(self, robot_map: RobotMap) -> None:
         """Take in a map; only what is new of it waits to be looked up."""
         run = robot_map.robot, robot_map.boot
-        named = {(*run, submap.id): submap for submap in robot_map.submaps}
-        for key in [k for k in self._walls if k[:2] == run and k not in named]:
-            del self._walls[key]
-            self._waiting.pop(key, None)
-            self._index.discard(key)
-        for key, submap in named.items():
+        walls = self._walls.setdefault(run, {})
+        for gone in walls.keys() - {submap.id for submap in robot_map.submaps}:
+            del walls[gone]
+            self._waiting.pop((*run, gone), None)
+            self._index.discard((*run, gone))
+        for submap in robot_map.submaps:
             wall = float(lengths(submap.map.segments).sum())
-            known = self._walls.get(key, 0.0)
+            known = walls.get(submap.id, 0.0)
             if wall >= self._p.min_wall and not known <= wall < known * (1 + self._p.growth):
-                self._walls[key] = wall
-                self._waiting[key] = submap
+                walls[submap.id] = wall
+                self._waiting[*run, submap.id] = submap
 
     @property
     def is_behind(self) -> bool:
