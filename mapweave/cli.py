@@ -10,13 +10,17 @@ import ast
 import errno
 import math
 import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from types import FrameType
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from mapweave.errors import MapweaveError
 from mapweave.kernels.loading import missing
@@ -30,6 +34,8 @@ COMMAND_GROUP = "mapweave.commands"
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
+INTERRUPTED = "mapweave: interrupted"
+STANDARD_ERROR = 2
 NO_ROOM = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO}
 
 
@@ -189,12 +195,36 @@ def _run(words: list[str]) -> int:
         known = ", ".join(sorted(points))
         print(f"mapweave: no command {words[0]!r}; there are {known}", file=sys.stderr)  # noqa: T201
         return EXIT_USAGE
-    command: Command = points[words[0]].load()
-    parser = parser_of(words[0], command)
+    with _ended_at_once():
+        command: Command = points[words[0]].load()
+        parser = parser_of(words[0], command)
     options = parser.parse_args(words[1:])
     if told := missing():
         print(f"mapweave: {told}", file=sys.stderr)  # noqa: T201
     return command.run(options)
+
+
+@contextmanager
+def _ended_at_once() -> Iterator[None]:
+    """Have Ctrl-C end the program while modules are loaded, and nothing is begun.
+
+    Some that are compiled make errors of their own of the exception that it otherwise is.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    here = threading.current_thread() is threading.main_thread()
+    if not here or before is not signal.default_int_handler:  # as where it is ignored
+        yield
+        return
+    signal.signal(signal.SIGINT, _end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _end(_number: int, _frame: FrameType | None) -> NoReturn:
+    os.write(STANDARD_ERROR, f"{INTERRUPTED}\n".encode())
+    os._exit(EXIT_INTERRUPTED)
 
 
 def _check_folder() -> None:
@@ -219,7 +249,7 @@ def _report(words: list[str]) -> int:
         print("mapweave: not enough memory for this input", file=sys.stderr)  # noqa: T201
         return EXIT_FAILED
     except KeyboardInterrupt:
-        print("mapweave: interrupted", file=sys.stderr)  # noqa: T201
+        print(INTERRUPTED, file=sys.stderr)  # noqa: T201
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         return _give_up_output()

@@ -111,7 +111,9 @@ class AgentRun:
             self._comparisons.earlier_map(run.map)
         self._needs = Needs(mapper.robot)
         self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
-        self._published: RobotMap = mapper.robot_map()
+        # A stored map that it begins with is there, and may be asked for, before the first scan.
+        self._published: RobotMap = numbered_from(mapper.robot_map(), first)
+        self._placed_before = _scans_placed(self._published)
         self._marks = OwnMarks(mapper.robot, mapper.boot, self._published.marks)
         self._orders = KeptOrders(state)
         self._reception = Dispatcher(
@@ -240,7 +242,7 @@ class AgentRun:
         self._publish_status()
         _log.info(
             "finished: %d of %d scans placed, submaps: %d",
-            _scans_placed(self._published),
+            self._scans_placed,
             self._scans_seen,
             len(self._published.submaps),
         )
@@ -363,6 +365,11 @@ class AgentRun:
         self._outbox.send_status(self._status())
         self._statuses.sent(time.monotonic(), self._state_told)
 
+    @property
+    def _scans_placed(self) -> int:
+        """How many scans of this run are in the map, as published last."""
+        return max(0, _scans_placed(self._published) - self._placed_before)
+
     def _status(self) -> StatusMessage:
         return StatusMessage(
             robot=self._mapper.robot,
@@ -370,7 +377,7 @@ class AgentRun:
             stamp=time.time(),
             state="finished" if self._finished else "mapping",
             scans_seen=self._scans_seen,
-            scans_placed=_scans_placed(self._published),
+            scans_placed=self._scans_placed,
             scans_total=self._total,
             scans_skipped=0 if self._live is None else self._live.skipped,
             scan_age=None if self._live is None else self._live.oldest(),

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
 from mapweave_agent.agent import AgentRun
+from mapweave_agent.past_runs import StateFolder
+from mapweave_agent.publication_schedule import AgentParameters
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.coding.trajectory_code import PER_METRE
@@ -243,3 +246,35 @@ def test_an_id_that_is_none_is_refused_at_once() -> None:
 def test_importing_the_package_loads_no_solver() -> None:
     code = "import mapweave_agent, sys; sys.exit('gtsam' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_stored_map_that_a_run_goes_on_from_is_numbered_as_the_run_is_from_the_beginning(
+    tmp_path: Path, logs: list[Path]
+) -> None:
+    first = Mapper("a")
+    for scan in scans_of(logs[0])[:10]:
+        first.add(scan)
+    mapper, state = Mapper("a", known=first.finish()), StateFolder(tmp_path)
+    run = AgentRun(Mock(), "t", mapper, Mock(), None, AgentParameters(), state, first=3)
+    assert run.robot_map.components == [3]
+
+
+def test_scans_of_a_stored_map_are_not_counted_as_placed_by_the_run_that_goes_on(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    scans, mapper = scans_of(logs[0]), Mapper("a")
+    for scan in scans[:20]:
+        mapper.add(scan)
+    with open_session([endpoint], patience=PATIENCE) as session:
+        listener = Listener(session, team)
+        with mapweave_agent.Agent(
+            "a", team, connect=endpoint, patience=PATIENCE, continued=mapper.finish()
+        ) as agent:
+            for scan in scans[20:]:
+                while agent.waiting:
+                    time.sleep(0.01)
+                agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+        listener.until(lambda: listener.finished("a"))
+    status = listener.statuses["a"]
+    new = len(scans) - 20
+    assert (status.scans_seen, status.scans_placed) == (new, new)

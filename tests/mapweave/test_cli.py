@@ -269,3 +269,29 @@ def test_ctrl_c_however_early_leaves_no_traceback(seconds: float, tmp_path: Path
     _, said = process.communicate(timeout=60.0)
     assert "Traceback" not in said
     assert process.returncode in (cli.EXIT_INTERRUPTED, -signal.SIGINT)
+
+
+LOADED = """
+import os, signal, time
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(60)
+except KeyboardInterrupt as error:
+    raise ValueError("a schema cannot be built") from error
+"""
+
+
+def test_ctrl_c_while_a_module_is_loaded_that_makes_another_error_of_it_is_an_interruption(
+    offer: Callable[[str], None], tmp_path: Path
+) -> None:
+    offer("pass")
+    tried = tmp_path / "tried.py"
+    tried.write_text(LOADED + tried.read_text())
+    done = subprocess.run(
+        [MAPWEAVE, "try"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (cli.EXIT_INTERRUPTED, "mapweave: interrupted\n")
