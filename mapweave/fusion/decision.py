@@ -39,18 +39,17 @@ class DecisionParameters(StageParameters):
         2.5, gt=0, description="[m] of common wall across the weakest direction"
     )
     min_rarity: float = Field(
-        45.0,
+        60.0,
         ge=0,
         description="[bits] of what is rare: half a million places where a map may lie in another"
-        " of 40 m, 19 bits; a million pairs of maps, 20; one wrong in a hundred such teams, 6. Of"
-        " 1499 pairs of stretches no wrong hypothesis that is not refused has more than 28, but"
-        " for one room that is there twice",
+        " of 40 m, 19 bits; a million pairs of maps, 20; and 20 more, as ends hang together. Of"
+        " 2800 pairs of stretches across buildings the rarest that is wrong and not refused has 49",
     )
     rarity_lead: float = Field(
         20.0, ge=0, description="[bits] of what is rare before its rival: a million to one"
     )
     rare_held: float = Field(
-        0.5, gt=0, description="[m] across the weakest direction of what is rare: two jambs"
+        1.5, gt=0, description="[m] across the weakest direction of what is rare"
     )
     min_complexity: float = Field(
         0.05, ge=0, description="[rad²] sc(P) of a shared polyline (V2): not just straight walls"

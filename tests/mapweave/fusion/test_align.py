@@ -329,12 +329,12 @@ def test_straight_walls_tell_places_apart_where_enough_of_them_run_across_the_ot
 @pytest.mark.parametrize(
     ("rarity", "of_rival", "held", "decision"),
     [
-        (50.0, 0.0, 0.6, "accepted"),  # wall ends hold it where walls do not
-        (44.0, 0.0, 0.6, "ambiguous"),  # a million pairs of maps have as much by chance
-        (50.0, 0.0, 0.4, "ambiguous"),  # nothing runs across
-        (60.0, 35.0, 0.6, "accepted"),
-        (60.0, 45.0, 0.6, "ambiguous"),  # as rare elsewhere
-        (None, None, 0.6, "ambiguous"),
+        (65.0, 0.0, 1.6, "accepted"),  # wall ends hold it where walls do not
+        (59.0, 0.0, 1.6, "ambiguous"),  # of a million pairs of maps some have as much by chance
+        (65.0, 0.0, 1.4, "ambiguous"),  # next to nothing runs across
+        (80.0, 55.0, 1.6, "accepted"),
+        (80.0, 65.0, 1.6, "ambiguous"),  # as rare elsewhere
+        (None, None, 1.6, "ambiguous"),
     ],
 )
 def test_what_is_rare_needs_less_wall_across_no_other_shape_and_less_of_a_lead(
