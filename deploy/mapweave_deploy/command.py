@@ -18,7 +18,7 @@ from mapweave.errors import FileError
 from mapweave.ids import check_id
 from mapweave.io.map_files import write_joint
 from mapweave.maps import MadeWith
-from mapweave.pictures.picture import draw_joint
+from mapweave.pictures.picture import check_picture, draw_joint
 from mapweave_deploy.run.display import open_display
 from mapweave_deploy.run.launcher import (
     Plan,
@@ -94,6 +94,7 @@ def run(options: argparse.Namespace) -> int:
     config = config_of(options)
     if options.http is not None:
         live_page()  # told now where a package is missing, not by a process that ends
+    check_picture(Folder(options.output).picture)  # likewise, not when all is done
     # Whoever terminates a team means all of it, as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     console = Console()

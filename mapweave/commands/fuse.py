@@ -14,7 +14,7 @@ from mapweave.errors import FileError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.io.map_files import alignment_content, load, save
 from mapweave.maps import Alignment, JointMap, RobotMap, parse_component
-from mapweave.pictures.picture import check_picture_suffix, plot
+from mapweave.pictures.picture import check_picture, plot
 from mapweave.team.joint_map import fuse
 from mapweave.text import percent
 
@@ -35,7 +35,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     config = config_of(options)
     if options.plot:
-        check_picture_suffix(options.plot)
+        check_picture(options.plot)
     inputs = [options.first, *options.others]
     check_outputs([options.output, options.plot], inputs)
     given = _read_distinct(inputs)

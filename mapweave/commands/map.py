@@ -32,7 +32,7 @@ from mapweave.mapping.localization.localizer import Localizer
 from mapweave.mapping.mapper import Mapper
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import RobotMap
-from mapweave.pictures.picture import check_picture_suffix, plot
+from mapweave.pictures.picture import check_picture, plot
 from mapweave.text import counted
 
 ROBOT = "r1"
@@ -78,7 +78,7 @@ def _run(options: argparse.Namespace) -> int:
         check_id("robot", options.robot)
     config = config_of(options)
     if options.plot:
-        check_picture_suffix(options.plot)
+        check_picture(options.plot)
     inputs = [] if options.log == STANDARD_INPUT else [Path(options.log)]
     stored = [path for path in (options.continued, options.localize) if path is not None]
     check_outputs([options.output, options.plot], [*inputs, *stored])

@@ -4,6 +4,7 @@ The same map always gives the same bytes. Drawing needs matplotlib, the optional
 """
 
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -113,8 +114,22 @@ def draw_joint(
     _draw(scenes, Path(path), title or f"Joint map, version {joint.version}", facts)
 
 
-def check_picture_suffix(path: Path) -> None:
-    """Raise FileError unless `path` ends in ``.svg`` or ``.png``: before long work, not after."""
+def check_picture(path: Path) -> None:
+    """Find out before long work, not after it, whether a picture can be drawn.
+
+    Raises
+    ------
+    FileError
+        If `path` ends neither in ``.svg`` nor in ``.png``.
+    MissingExtraError
+        If matplotlib is not installed.
+    """
+    _check_suffix(path)
+    if find_spec("matplotlib") is None:  # loading it takes long
+        raise MissingExtraError("a picture", "plot")
+
+
+def _check_suffix(path: Path) -> None:
     if path.suffix.lower() not in PICTURE_SUFFIXES:
         raise FileError(
             path, f"expected a picture's name to end in {' or '.join(PICTURE_SUFFIXES)}"
@@ -134,7 +149,7 @@ def _count(number: int, thing: str) -> str:
 
 
 def _draw(scenes: Sequence[Scene], path: Path, title: str, facts: Sequence[str]) -> None:
-    check_picture_suffix(path)
+    _check_suffix(path)
     figure = _figure_module()
     drawn = figure.draw(scenes, title, " · ".join(facts))
     with replace_file(path) as temporary:

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 
 from mapweave.cli import Command
+from mapweave.errors import ArgumentError
 from mapweave.maps import JointMap
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.security.settings import LinkSettings
@@ -15,7 +16,7 @@ from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 from mapweave_protocol.wire.messages import PoseMessage
 from mapweave_ros.foxglove_live import SCHEME as FOXGLOVE
 from mapweave_ros.foxglove_live import FoxgloveOutput
-from mapweave_ros.network import Ros2Network
+from mapweave_ros.network import SCHEME, Ros2Network
 from mapweave_ros.output import Ros2Output
 
 POLL = 0.1  # [s] after which a signal is noticed
@@ -47,6 +48,9 @@ def _run(options: argparse.Namespace) -> int:
 
 def _output(word: str, team: str, endpoints: Sequence[str]) -> Ros2Output | FoxgloveOutput:
     """Return the output that `word` names."""
+    if not word.startswith((FOXGLOVE, SCHEME)):
+        expected = f"expected {SCHEME}, or {FOXGLOVE}PORT such as {FOXGLOVE}8765"
+        raise ArgumentError("--to", f"{expected}, got {word!r}")
     if not word.startswith(FOXGLOVE):
         return Ros2Output.of_team(Ros2Network.parse(word, endpoints), team)
     output = FoxgloveOutput.parse(word)

@@ -6,6 +6,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from mapweave.cli import main
 from mapweave_protocol.link.session import open_session
 from mapweave_ros.messages import MARKER_ARRAY, OCCUPANCY_GRID, TF_MESSAGE
 from tests.agent.test_agent import MAPWEAVE, PATIENCE
@@ -61,3 +64,11 @@ def test_an_agent_and_a_bridge_show_ros_2_the_walls_and_frames_of_a_team(
         grid, shown = heard[f"{topic}/map"].messages[-1], heard[f"{topic}/walls"].messages[-1]
         assert grid.header.frame_id == frame
         assert distance_to(occupied(grid), segments_of(shown, "walls")).max() <= CELL
+
+
+def test_a_place_to_show_a_team_that_is_none_is_refused_with_those_there_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["bridge", "--to", "foxglove"]) == 1
+    said = capsys.readouterr().err
+    assert said.endswith("expected ros2:, or foxglove:PORT such as foxglove:8765, got 'foxglove'\n")

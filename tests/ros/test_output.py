@@ -1,8 +1,12 @@
 """What a ROS 2 network is told comes back by another's definitions, and shows the same walls."""
 
+import json
 import struct
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
@@ -31,6 +35,7 @@ GRID, MARKERS, TF = (
     "visualization_msgs/msg/MarkerArray",
     "tf2_msgs/msg/TFMessage",
 )
+PEER = Path(__file__).with_name("peer_listener.py")
 PATIENCE = 20.0  # [s]
 CELL = 0.05  # [m]
 COVARIANCE = (0.0,) * 6
@@ -101,6 +106,34 @@ def test_who_comes_late_gets_the_grid_and_the_walls_of_the_last_map(
     np.testing.assert_array_equal(segments_of(markers, "walls"), walls)
     labels = [(m.text, m.header.frame_id) for m in markers.markers if m.ns == "robots"]
     assert labels == [("r1", "r1/base_link")]
+
+
+def test_an_independent_ros_2_peer_sees_the_same_walls_in_grid_and_markers(
+    endpoint: str, mapped: RobotMap, tmp_path: Path
+) -> None:
+    host, port = endpoint.removeprefix("tcp/").split(":")
+    peer = [sys.executable, str(PEER), host, port, str(tmp_path), "29"]
+    walls = mapped.lines(0).segments
+    at_start = pose().model_copy(update={"robot": "r1", "component": "r1/0"})
+    heard = tmp_path / "heard"
+    with (
+        Ros2Output.of_robot(Ros2Network((endpoint,), 29), "r1") as output,
+        heard.open("w") as file,
+        subprocess.Popen(peer, stdout=file) as process,
+    ):
+        while process.poll() is None:  # transforms are not kept for who is late
+            output.tell(mapped)
+            output.tell(at_start)
+            time.sleep(0.2)
+    said = {told.pop("topic"): told for told in map(json.loads, heard.read_text().splitlines())}
+    assert said.keys() == {"/r1/map", "/r1/walls", "/tf"}
+    np.testing.assert_allclose(np.reshape(said["/r1/walls"]["ends"], (-1, 4)), walls, atol=1e-3)
+    (width, height), origin = said["/r1/map"]["size"], said["/r1/map"]["origin"]
+    row, column = np.nonzero(np.reshape(said["/r1/map"]["cells"], (height, width)) == 100)
+    middles = np.column_stack([origin[0] + CELL * (column + 0.5), origin[1] + CELL * (row + 0.5)])
+    assert len(middles) > 100
+    assert distance_to(middles, walls).max() < CELL
+    assert said["/tf"]["frames"] == [["r1/map", "r1/base_link"]]
 
 
 def test_what_is_said_carries_what_rmw_zenoh_attaches(

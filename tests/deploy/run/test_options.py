@@ -1,5 +1,8 @@
 """What `mapweave team` refuses before it starts anything."""
 
+import sys
+from pathlib import Path
+
 import pytest
 
 from mapweave.cli import main
@@ -32,3 +35,12 @@ def test_a_lidar_is_given_to_simulated_robots_only(capsys: pytest.CaptureFixture
         main(["team", "a.log", "--lidar", "urg"])
     assert ended.value.code == 2
     assert "--lidar is of simulated robots: expected --world" in capsys.readouterr().err
+
+
+def test_a_picture_that_cannot_be_drawn_is_told_before_the_team_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert main(["team", "--world", "arena", "--output", str(tmp_path / "team")]) == 1
+    assert "pip install 'mapweave[plot]'" in capsys.readouterr().err
+    assert not (tmp_path / "team").exists()

@@ -299,6 +299,17 @@ def test_a_picture_that_cannot_be_is_refused_before_any_work(log: Path, tmp_path
     assert not output.exists()
 
 
+def test_a_picture_without_its_package_is_refused_before_any_work(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    output = tmp_path / "out.json"
+    done = main_here("map", log, "--output", output, "--plot", tmp_path / "map.png")
+    assert (done.returncode, output.exists()) == (1, False)
+    assert done.stderr.endswith("pip install 'mapweave[plot]'\n")
+    assert done.stderr.count("\n") == 1
+
+
 def test_an_output_that_cannot_be_written_fails_in_one_line(log: Path, tmp_path: Path) -> None:
     output = tmp_path / "no" / "out.json"
     assert_fails_in_one_line(main_here("map", log, "--output", output), output, "cannot be written")
