@@ -1,8 +1,8 @@
 """Who sends much, or is slow to listen, does so at nobody's cost but its own."""
 
-import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.messages import JointStatusMessage, MapMessage
-from tests.fusion_server.conftest import MAPWEAVE, PATIENCE, MakeMap, Network, StartServer
+from tests.fusion_server.conftest import PATIENCE, MakeMap, Network, StartServer
 
 FLOOD = 3000  # maps: several times as many seconds of reading as between two words of a coordinator
 ROUNDS = 60
@@ -68,27 +68,33 @@ def test_nobody_waits_for_who_is_slow_to_take_what_is_published(
     publisher.undeclare()  # type: ignore[no-untyped-call]
 
 
+FOLLOW = """
+import sys
+import mapweave_protocol
+for joint in mapweave_protocol.joint_maps(sys.argv[1], connect=sys.argv[2], since=0):
+    print(joint.version, flush=True)
+"""
+
+
 @contextmanager
-def _stopped_watcher(network: Network, folder: Path) -> Iterator["subprocess.Popen[bytes]"]:
-    """Have somebody who follows the team, and then stands still with the connection open."""
-    words = ["watch", "--team", network.team, "--connect", network.endpoint]
-    with (folder / "watch.log").open("wb") as log:
+def _follower(network: Network, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """Have somebody who writes down which versions come, in a process of his own."""
+    with log.open("wb") as told:
         process = subprocess.Popen(
-            [MAPWEAVE, *words], stdout=log, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+            [sys.executable, "-c", FOLLOW, network.team, network.endpoint], stdout=told
         )
     try:
-        _wait_for(folder, "a is here")
-        process.send_signal(signal.SIGSTOP)
         yield process
     finally:
         process.kill()
         process.wait(PATIENCE)
 
 
-def _wait_for(folder: Path, words: str) -> None:
+def _wait_for_versions(log: Path, last: int) -> None:
+    """Wait until all versions up to the `last` are written down, in order and once each."""
     deadline = time.monotonic() + PATIENCE
-    while words not in (folder / "watch.log").read_text():
-        assert time.monotonic() < deadline, (folder / "watch.log").read_text()
+    while (told := log.read_text().split()) != [str(n + 1) for n in range(last)]:
+        assert time.monotonic() < deadline, told
         time.sleep(0.05)
 
 
@@ -97,12 +103,16 @@ def test_a_subscriber_that_stands_still_keeps_no_version_from_the_others_and_cat
 ) -> None:
     start_server()
     watcher, session = network.watcher(), network.connect()
-    # More than networks keep for somebody who does not read; nobody but him takes it for anything.
-    ballast = keys.POSE.build(team=network.team, robot="b")
-    with network.robot("a") as a, _stopped_watcher(network, tmp_path) as stopped:
+    # More than networks keep for somebody who does not read; of those here he alone listens to it.
+    ballast = keys.JOINT_STATUS.build(team=network.team)
+    log = tmp_path / "versions"
+    with network.robot("a") as a, _follower(network, log) as stopped:
         for version in range(1, ROUNDS + 1):
+            if version == 2:  # he has begun
+                _wait_for_versions(log, 1)
+                stopped.send_signal(signal.SIGSTOP)
             session.put(ballast, bytes(BALLAST // ROUNDS))
             a.publish_map(make_map("a", version))
             assert watcher.next().version == version
         stopped.send_signal(signal.SIGCONT)
-        _wait_for(tmp_path, f"joint map {ROUNDS}: ")
+        _wait_for_versions(log, ROUNDS)

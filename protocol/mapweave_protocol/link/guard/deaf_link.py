@@ -77,7 +77,10 @@ def answers(session: zenoh.Session) -> bool:
 
 
 def cut_links(session: zenoh.Session) -> None:
-    """Shut down the sockets of the session's links, which Zenoh offers no call for."""
+    """Shut down the sockets of the session's links, which Zenoh offers no call for.
+
+    Only what goes out, so that the router has closed the link before this end connects again.
+    """
     ports = {(_port(link.src), _port(link.dst)) for link in session.info.links()}
     for opened in Path("/dev/fd").iterdir():
         descriptor = int(opened.name)
@@ -86,7 +89,7 @@ def cut_links(session: zenoh.Session) -> None:
                 continue
             with socket.socket(fileno=os.dup(descriptor)) as end:
                 if (end.getsockname()[1], end.getpeername()[1]) in ports:
-                    end.shutdown(socket.SHUT_RDWR)
+                    end.shutdown(socket.SHUT_WR)
         except (OSError, IndexError):  # closed meanwhile, or of another family
             continue
 
