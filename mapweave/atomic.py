@@ -56,11 +56,22 @@ def check_outputs(outputs: Sequence[Path | None], inputs: Sequence[Path]) -> Non
         if path is None:
             continue
         _check_replaceable(path)
-        if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-            raise FileError(path, f"cannot be written: there is no writable folder {path.parent}")
+        _check_folder(path)
         if path.resolve() in taken:
             raise FileError(path, f"{taken[path.resolve()]}; expected another name")
         taken[path.resolve()] = "is named for two results"
+
+
+def _check_folder(path: Path) -> None:
+    """Check that a file can be made where `path` says."""
+    folder = path.parent.resolve()
+    if not folder.exists():
+        raise FileError(path, f"cannot be written: there is no folder {folder}")
+    if not folder.is_dir():
+        raise FileError(path, f"cannot be written: {folder} is no folder")
+    if not os.access(folder, os.W_OK):
+        problem = f"cannot be written: the folder {folder} may not be written by this user"
+        raise FileError(path, problem)
 
 
 def _check_replaceable(path: Path) -> None:

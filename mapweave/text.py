@@ -3,11 +3,16 @@
 Nothing reads these sentences again; what a program needs to know is in the values.
 """
 
+import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mapweave.reasons import Pair, Reason, ReasonKind, Status, StatusKind
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 MAX_LENGTH = 500  # characters of a sentence, as many as a message carries
 
@@ -53,6 +58,21 @@ _MATCH = "{:.0f} m of wall in common, {:.1f} m contradicted"
 def counted(number: int, noun: str) -> str:
     """Return a number of things for a person: 1 submap, 2 submaps."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def in_words(problem: "ErrorDetails") -> str:
+    """Return what is wrong with a value of a file or a message, and what was expected.
+
+    Parameters
+    ----------
+    problem
+        As the library found it that checks them.
+    """
+    said = problem["msg"].removeprefix("Value error, ")
+    if problem["type"] == "json_invalid":
+        return f"is no JSON, or is cut off (at {said.rpartition(' at ')[2]})"
+    whole = {"missing": "is missing", "extra_forbidden": "no such field"}.get(problem["type"])
+    return whole or re.sub("^Input should be ", "expected ", said)
 
 
 def percent(probability: float) -> str:

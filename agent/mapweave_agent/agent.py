@@ -186,7 +186,7 @@ class AgentRun:
     def _in_the_team(self) -> Iterator[None]:
         robot, put = self._mapper.robot, self._inbox.put
         with self._outbox, listening(self._session, self._team, robot, put):
-            _log.info("%s joins team %s", self._mapper.robot, self._team)
+            _log.info("joins team %s", self._team)
             yield
             if self._reception.refused:
                 _log.warning("%d messages were not valid and ignored", self._reception.refused)

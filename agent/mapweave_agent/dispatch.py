@@ -23,11 +23,10 @@ from mapweave_protocol.link.inbox import (
     status_reader,
 )
 from mapweave_protocol.link.lacking import Lacking
-from mapweave_protocol.link.status_schedule import COORDINATOR_INTERVAL
+from mapweave_protocol.link.status_schedule import SILENCE
 from mapweave_protocol.wire.messages import StatusMessage
 
 MAX_PEERS = 64  # with a map here
-SILENCE = 1.5 * COORDINATOR_INTERVAL  # [s] in which no coordinator is heard
 FAR = 1_000_000  # versions from one message to the next: eleven days of one a second
 
 _log = logging.getLogger(__name__)

@@ -35,6 +35,7 @@ from mapweave.maps import (
 )
 from mapweave.reasons import Reason, Status
 from mapweave.scan.coverage import coverage
+from mapweave.text import in_words
 
 _EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
 _METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
@@ -180,7 +181,7 @@ def _check(path: Path, content: bytes, model: type[_File]) -> _File:
 def _first_problem(error: ValidationError) -> str:
     """Return where the first problem is, what it is and what was found: ``submaps[0].pose: …``."""
     problem = error.errors(include_url=False, include_context=False)[0]
-    message = problem["msg"].removeprefix("Value error, ")
+    message = in_words(problem)
     found = problem["input"]
     if isinstance(found, str | float | int) and problem["loc"]:
         message += f", found {reprlib.repr(found)}"

@@ -9,7 +9,7 @@ import zenoh
 
 from mapweave.cli import Command, add_config_argument, config_of
 from mapweave.commands.progress import track
-from mapweave.errors import FileError, MapweaveError
+from mapweave.errors import FileError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id, is_id
 from mapweave.io.map_files import read_map
@@ -18,16 +18,16 @@ from mapweave.text import percent
 from mapweave_agent.by_hand.delivery import Delivery
 from mapweave_agent.past_runs import numbered_from
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
-from mapweave_protocol.link.asking import ask_map_of_component, ask_runs
+from mapweave_protocol.link.asking import ask_map_of_component
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.link.security.membership import check_member
 from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.session import open_session
+from mapweave_protocol.operator.delivery import PATIENCE, runs_of
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 from mapweave_protocol.wire.orders.runs_message import WireRun
 from mapweave_protocol.wire.pairs import ordered
 
-PATIENCE = 10.0  # [s] for a router
 UNNAMED = "0"  # the boot of a map that was made of a file
 
 
@@ -51,9 +51,7 @@ def _run(options: argparse.Namespace) -> int:
         check_member(link, Member(team, Role.ROBOT, robot))
     parameters = FusionParameters.of(config_of(options))
     with open_session(endpoints, patience=PATIENCE, link=link) as session:
-        runs = ask_runs(session, team)
-        if runs is None:
-            raise MapweaveError(f"no coordinator of team {team} answers; is one running?")
+        runs = runs_of(session, team)
         own = numbered(replace(robot_map, robot=robot, boot=boot), runs)
         with Delivery(session, team, own) as delivery:
             delivery.map()

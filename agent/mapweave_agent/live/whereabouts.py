@@ -161,7 +161,9 @@ class Whereabouts:
             _log.info("%s is in no joint map from version %d on", name, status.version)
         else:
             self._since[name] = frame, status.version
-            _log.info("%s is in the frame of %s from version %d on", name, frame, status.version)
+            whose = "its own frame again" if frame == name else f"the frame of {frame}"
+            if frame != name or known is not None:  # that it begins in its own is no news
+                _log.info("%s is in %s from version %d on", name, whose, status.version)
 
 
 def covariance_of(uncertainty: FloatArray | None) -> FloatArray:

@@ -20,7 +20,9 @@ LATEST = "latest"
 def add_store_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--store`` and ``--team``; read them with `store_of`."""
     parser.add_argument(
-        "--team", default=DEFAULT_TEAM, metavar="T", help=f"the team's id (default {DEFAULT_TEAM})"
+        "--team",
+        metavar="T",
+        help=f"the team's id (default whose the store is; without --store {DEFAULT_TEAM})",
     )
     parser.add_argument(
         "--store", type=Path, metavar="FILE", help="the store (default mapweave-TEAM.sqlite)"
@@ -33,9 +35,10 @@ def store_of(options: argparse.Namespace) -> StoreView:
     Raises
     ------
     FileError
-        If there is none.
+        If there is none, or it is another team's.
     """
-    return StoreView(options.store or default_store(check_id("team", options.team)))
+    team = None if options.team is None else check_id("team", options.team)
+    return StoreView(options.store or default_store(team or DEFAULT_TEAM), team)
 
 
 def default_store(team: str) -> Path:

@@ -36,20 +36,23 @@ class StoreView:
     ----------
     path
         The file.
+    team
+        Whose store is expected; anybody's if None.
 
     Raises
     ------
     FileError
-        If it is not a store, or one of another schema.
+        If it is not a store, one of another schema, or another team's.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, team: str | None = None) -> None:
         self.path = path
         if is_missing(path):
             raise FileError(path, "no store here; expected the file that mapweave server keeps")
         self._database = Database(path, read_only=True)
         try:
             self._check_schema()
+            self._check_owner(team)
         except FileError:
             self._database.close()
             raise
@@ -159,6 +162,12 @@ class StoreView:
         if schema != SCHEMA_VERSION:
             problem = f"a store of schema {schema}, expected {SCHEMA_VERSION}"
             raise FileError(self.path, f"{problem}: the server brings it up when it opens it")
+
+    def _check_owner(self, team: str | None) -> None:
+        owners = {str(owner) for (owner,) in self._database.rows("SELECT team FROM owner")}
+        if team is not None and owners and team not in owners:
+            problem = f"the store of team {', '.join(owners)!r}, expected team {team!r}"
+            raise FileError(self.path, problem)
 
 
 def _may_be_replaced(path: Path) -> bool:

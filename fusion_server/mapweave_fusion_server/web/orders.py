@@ -20,6 +20,7 @@ from mapweave.errors import MapweaveError
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave.orders import MAX_REASON, Order, OrderKind
+from mapweave.text import in_words
 from mapweave_fusion_server.web.access.member import operator_of
 from mapweave_fusion_server.web.knowledge import Knowledge
 from mapweave_protocol.operator.joins import found_between
@@ -165,4 +166,4 @@ def _wish_of(body: bytes) -> JoinWish | UndoWish:
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         place = ".".join(str(part) for part in first["loc"])
-        raise HTTPException(400, f"{place or 'order'}: {first['msg']}") from error
+        raise HTTPException(400, f"{place or 'order'}: {in_words(first)}") from error

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from mapweave.errors import FileError, MissingExtraError
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.mapping.grids.cells import GridCells
+from mapweave.text import in_words
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -82,7 +83,7 @@ def _settings(path: Path) -> _Settings:
     except ValidationError as error:
         problem = error.errors(include_url=False, include_context=False)[0]
         place = ".".join(map(str, problem["loc"]))
-        words = f"{place}: {problem['msg']}" if place else problem["msg"]
+        words = f"{place}: {in_words(problem)}" if place else in_words(problem)
         raise FileError(path, f"{words}; {_EXPECTED}") from error
 
 

@@ -35,7 +35,16 @@ def _reason(endpoint: str, keys: KeyFolder | None) -> str:
         return "refused: nothing listens there"
     except OSError as error:
         return error.strerror or str(error)
-    return "something listens there, but not a router that lets us in"
+    return f"something listens there, but not a router that lets us in{_hint(endpoint, keys)}"
+
+
+def _hint(endpoint: str, keys: KeyFolder | None) -> str:
+    """Return what is wanted by a router that lets in only members of its team."""
+    if keys is not None:
+        return ""
+    encrypted = f"tls/{endpoint.partition('/')[2]}"
+    where = "" if endpoint == encrypted else f"{encrypted} and "
+    return f" (if it has keys, give {where}--tls DIR)"
 
 
 def _handshake(connection: socket.socket, host: str, keys: KeyFolder) -> str:

@@ -8,6 +8,7 @@ import math
 from mapweave_protocol.link.lacking import GRACE
 
 COORDINATOR_INTERVAL = 15.0  # [s] between statuses of a coordinator, though nothing changes
+SILENCE = 1.5 * COORDINATOR_INTERVAL  # [s] in which no coordinator is heard
 AGAIN = GRACE + 0.5  # [s] after somebody came: what is still missing then did not arrive by itself
 TIMES = 2  # that it is said again: the first status may come before the other's link is whole
 

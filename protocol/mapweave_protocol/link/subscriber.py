@@ -1,6 +1,7 @@
 """The team's maps in two lines: generators that yield what arrives, as typed values.
 
-Each opens a session of its own, and closes it when the generator is closed or ends.
+Each opens a session of its own, and closes it when the generator is closed or ends. As long as no
+router lets it in, it waits, and logs why.
 """
 
 import logging
@@ -16,6 +17,7 @@ import zenoh
 from mapweave.errors import ArgumentError
 from mapweave.geometry.arguments import as_positive
 from mapweave.maps import JointMap, RobotMap
+from mapweave.text import shown
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.asking import ask_for_what_is_valid, ask_latest, request_statuses
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
@@ -179,7 +181,7 @@ def poses(
     """
     inbox, key = Inbox(MAX_POSES), POSE.pattern(team=team)
     with (
-        open_session(connect, patience=timeout, link=link) as session,
+        open_session(connect, patience=timeout, on_wait=_tell_waiting, link=link) as session,
         session.declare_subscriber(key, inbox.put),
     ):
         read = _read(pose_reader(), inbox.newest, timeout)
@@ -199,10 +201,15 @@ def _listening(
         as_positive("timeout", timeout, "s")
     inbox = Inbox()
     with (
-        open_session(connect, patience=timeout, link=link) as session,
+        open_session(connect, patience=timeout, on_wait=_tell_waiting, link=link) as session,
         declare_subscriber(session, key, inbox.put, history=history),
     ):
         yield session, inbox
+
+
+def _tell_waiting(reason: str) -> None:
+    # A warning: a program that has set up no log shows it as well.
+    _log.warning("waiting for a router: %s", shown(reason, 300))
 
 
 def _read(

@@ -30,7 +30,25 @@ from mapweave_protocol.wire.keys import COORDINATOR_LIVE, JOINT_STATUS, LIVE, ST
 from mapweave_protocol.wire.messages import JointStatusMessage, StatusMessage
 
 LISTENED = 1.5  # [s] for everybody to answer; a robot does between two scans
-COLUMNS = ("", "here", "state", "scans", "map", "behind", "peers' maps", "sent", "refused", "lost")
+COLUMNS = (
+    "",
+    "here",
+    "state",
+    "scans",
+    "map version",
+    "versions behind",
+    "maps held",
+    "sent",
+    "messages refused",
+    "messages lost",
+)
+MEANING = (
+    "map version: the latest of a robot's own map; of the joint map, in the coordinator's row."
+    " versions behind: of the robot's map, that the coordinator lacks."
+    " maps held: how many runs of robots this one has the map of."
+    " messages refused: as not valid, by who sent them. messages lost: that found no room."
+    " Robots that are gone are shown as far as the coordinator holds a map of theirs."
+)
 
 
 @dataclass
@@ -53,6 +71,17 @@ class Team:
     statuses: dict[str, StatusMessage] = field(default_factory=dict)
     coordinators: set[str] = field(default_factory=set)
     coordinator: JointStatusMessage | None = None
+
+    @property
+    def robots(self) -> list[str]:
+        """All that are here, or said something, or that the coordinator holds a map of."""
+        held = () if self.coordinator is None else self.coordinator.maps
+        return sorted(self.here | self.statuses.keys() | {m.robot for m in held})
+
+    def held(self, robot: str) -> str:
+        """Return the versions that the coordinator holds of the maps of a robot's runs."""
+        maps = () if self.coordinator is None else self.coordinator.maps
+        return ", ".join(str(m.version) for m in maps if m.robot == robot)
 
     def behind(self, robot: str) -> int | None:
         """Return how many versions of a robot's map the coordinator lacks, None if unknown."""
@@ -130,10 +159,11 @@ def _coordinator_row(team: Team) -> tuple[str, ...]:
 
 
 def _robot_rows(team: Team) -> Iterator[tuple[str, ...]]:
-    for robot in sorted(team.here | team.statuses.keys()):
+    for robot in team.robots:
         status, here = team.statuses.get(robot), "yes" if robot in team.here else "no"
         if status is None:
-            yield robot, here, "says nothing"
+            state = "says nothing" if robot in team.here else "gone"
+            yield robot, here, state, "", team.held(robot)
             continue
         behind = team.behind(robot)
         sent = sum(traffic.bytes for traffic in status.sent.values())
@@ -167,6 +197,7 @@ def _as_json(team: Team) -> str:
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
+    parser.description = f"{command.summary} {MEANING}"
     add_connection_arguments(parser)
     parser.add_argument("--json", action="store_true", help="one line of JSON for programs")
     parser.add_argument(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from mapweave.maps import JointMap, RobotMap, component_name
 from mapweave.text import counted
-from mapweave_protocol.link.claimants import Claimants, tell_coordinators, tell_robots
+from mapweave_protocol.link.claimants import MOST, Claimants, tell_coordinators, tell_robots
 from mapweave_protocol.narration.story_alignments import AlignmentStory
 from mapweave_protocol.narration.story_joint import JointStory
 from mapweave_protocol.narration.story_said import SaidStory
@@ -27,6 +27,8 @@ class RobotState:
         How many submaps its map had when that was told last.
     parts
         The names of all components that the run of `map` has had.
+    finished
+        The runs that were told to have finished.
     """
 
     claimants: Claimants = field(default_factory=Claimants)
@@ -34,6 +36,7 @@ class RobotState:
     map: RobotMap | None = None
     told: int = 0
     parts: set[str] = field(default_factory=set)
+    finished: set[str] = field(default_factory=set)
 
     @property
     def here(self) -> bool:
@@ -105,11 +108,12 @@ class Story:
             yield tell_coordinators(count)
 
     def status(self, message: StatusMessage) -> Iterator[str]:
-        """Tell when a robot has finished mapping."""
+        """Tell that a run of a robot has finished mapping, once."""
         state = self._robot(message.robot)
-        before, state.status = state.status, message
-        finished_before = before is not None and before.state == "finished"
-        if message.state == "finished" and not finished_before:
+        state.status = message
+        is_told = message.boot in state.finished or len(state.finished) >= MOST
+        if message.state == "finished" and not is_told:
+            state.finished.add(message.boot)
             yield f"{message.robot} has finished: {state.progress}"
 
     def mapped(self, robot_map: RobotMap) -> Iterator[str]:

@@ -47,4 +47,4 @@ def _tell(component: JointComponent, now: Coverage) -> str:
     if not count:
         return f"{searched}, nothing left to search"
     widest = float(np.linalg.norm(np.diff(now.frontiers[0], axis=0), axis=1).sum())
-    return f"{searched}, goes on in {counted(count, 'place')}, the widest {widest:.1f} m"
+    return f"{searched}, goes on at {counted(count, 'frontier')}, the widest {widest:.1f} m"

@@ -18,7 +18,7 @@ from rich.text import Text
 from mapweave.cli import Command
 from mapweave.text import shown
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
+from mapweave_protocol.link.arguments import DEFAULT_TEAM, add_connection_arguments, connection_of
 from mapweave_protocol.link.asking import ask_joint_maps
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE, MapAssembler
 from mapweave_protocol.link.guard.refusals import Refusals
@@ -38,6 +38,8 @@ from mapweave_protocol.link.inbox import (
 from mapweave_protocol.link.joint_changes import JointAssembler
 from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import declare_subscriber, open_session
+from mapweave_protocol.narration.attendance import Attendance
+from mapweave_protocol.narration.past import Past
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.narration.story_coverage import CoverageStory
 from mapweave_protocol.narration.story_joint import tell_components
@@ -73,6 +75,13 @@ _log = logging.getLogger(__name__)
 class Watcher:
     """Reads what arrives and tells it.
 
+    Parameters
+    ----------
+    team
+        The team's id.
+    clock
+        Returns the time [s].
+
     Attributes
     ----------
     story
@@ -82,8 +91,12 @@ class Watcher:
         or the coordinator may have another one than was told.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self, team: str = DEFAULT_TEAM, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self.story = Story()
+        self._clock = clock
+        self._attendance = Attendance(team, self.story)
         self.lacks_version = False
         self._coverage = CoverageStory()
         self._assembler = MapAssembler()
@@ -102,8 +115,19 @@ class Watcher:
 
     def tell(self, arrival: Arrival) -> Iterator[str]:
         """Yield the lines that tell `arrival`."""
+        self._attendance.heard()
         for teller in self._tellers:
             yield from teller(arrival)
+
+    def look(self, *, linked: bool) -> Iterator[str]:
+        """Yield the lines that tell what has lasted, such as that somebody is gone.
+
+        Parameters
+        ----------
+        linked
+            Whether a router is connected.
+        """
+        yield from self._attendance.look(self._clock(), linked=linked)
 
     def tell_joint(self, message: JointMapMessage) -> Iterator[str]:
         """Yield the lines that tell a version of the joint map, once."""
@@ -122,7 +146,7 @@ class Watcher:
         # Nothing else tells of a last version that was lost while the link was down.
         there = message.series, message.version
         self.lacks_version |= message.version > 0 and self._told != there
-        yield from ()
+        yield from self._attendance.coordinator_spoke(self._clock())
 
     def _tell_status(self, message: StatusMessage) -> Iterator[str]:
         self._note(message.robot)
@@ -151,11 +175,10 @@ class Watcher:
         if coordinator is not None:
             boot, here = coordinator
             self.lacks_version |= here  # it is seen again after an outage
-            yield from self.story.coordinator(boot, here=here)
+            yield from self._attendance.coordinator(boot, self._clock(), here=here)
         if presence is not None:
             self._note(presence.robot)
-            change = self.story.appeared if presence.here else self.story.left
-            yield from change(presence.robot, presence.boot)
+            yield from self._attendance.robot(presence, self._clock())
 
 
 def _teller(reader: Reader[M], tell: Callable[[M], Iterator[str]]) -> Teller:
@@ -173,19 +196,25 @@ def watch(
     on_wait: Callable[[str], None],
     link: LinkSettings | None = None,
 ) -> Iterator[str | None]:
-    """Yield the lines of the story as it happens, and None now and then while nothing does."""
+    """Yield the lines of the story as it happens, and None now and then while nothing does.
+
+    Those that tell what was before say so.
+    """
     inbox = Inbox()
     with open_session(endpoints, on_wait=on_wait, link=link) as session, ExitStack() as subscribers:
         _subscribe(session, team, inbox, subscribers)
-        yield from _tell_latest(session, team, watcher)
+        past = Past()
+        yield from past.marked(_tell_latest(session, team, watcher))
         due = time.monotonic()
         while True:
             # A complete version may come late, or never where all robots are parked.
             if watcher.lacks_version and time.monotonic() >= due:
-                yield from _tell_latest(session, team, watcher)
+                yield from past.marked(_tell_latest(session, team, watcher))
                 due = time.monotonic() + ASKED_EVERY
             arrival = inbox.get(POLL)
-            yield from watcher.tell(arrival) if arrival else (None,)
+            past.heard(time.monotonic(), something=arrival is not None)
+            yield from past.marked(watcher.tell(arrival)) if arrival else (None,)
+            yield from watcher.look(linked=bool(session.info.routers_zid()))
 
 
 def _tell_latest(session: zenoh.Session, team: str, watcher: Watcher) -> Iterator[str]:
@@ -244,7 +273,7 @@ def _run(options: argparse.Namespace) -> int:
     team, endpoints, link = connection_of(options)
     console = Console()
     waiting = Console(stderr=True)
-    watcher = Watcher()
+    watcher = Watcher(team)
     story = watch(
         team,
         endpoints,

@@ -1,25 +1,31 @@
 """Orders to the coordinator, and what an order is about from there."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import zenoh
 
 from mapweave.errors import MapweaveError
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.link.asking import (
+    ANSWER_WITHIN,
     ask_latest,
     ask_map_of_component,
     ask_orders,
     ask_robot_map,
+    ask_runs,
 )
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import ORDER
 from mapweave_protocol.wire.messages import MapMessage, OrderMessage
+from mapweave_protocol.wire.orders.runs_message import WireRun
 
 PATIENCE = 10.0  # [s] for a router, and for a coordinator
 PAUSE = 0.2  # [s] between two tries
+
+T = TypeVar("T")
 
 
 class OrderError(MapweaveError):
@@ -56,12 +62,20 @@ def orders_of(session: zenoh.Session, team: str) -> list[OrderMessage]:
     Raises
     ------
     OrderError
-        If no coordinator answers.
+        If no coordinator answers for some time.
     """
-    held = ask_orders(session, team)
-    if held is None:
-        raise OrderError(_silent(team))
-    return held
+    return _answer(team, lambda seconds: ask_orders(session, team, seconds))
+
+
+def runs_of(session: zenoh.Session, team: str) -> list[WireRun]:
+    """Return the runs that the coordinator holds, of all robots.
+
+    Raises
+    ------
+    OrderError
+        If none answers for some time.
+    """
+    return _answer(team, lambda seconds: ask_runs(session, team, seconds))
 
 
 def latest_joint_map(session: zenoh.Session, team: str) -> JointMap:
@@ -72,34 +86,55 @@ def latest_joint_map(session: zenoh.Session, team: str) -> JointMap:
     OrderError
         If there is none.
     """
-    message, answered = ask_latest(session, team)
-    if not answered:
-        raise OrderError(_silent(team))
+    message, _ = ask_latest(session, team)
     if message is None:
         raise OrderError(f"there is no joint map of team {team} yet")
     return message.unpack()
 
 
-def map_of(session: zenoh.Session, team: str, name: str) -> RobotMap:
-    """Return the map of the run that a component is of, or of a robot's last run.
+def maps_of(session: zenoh.Session, team: str, names: Sequence[str]) -> dict[str, RobotMap]:
+    """Return by name the map of the run that a component is of, or of a robot's last run.
 
     Parameters
     ----------
-    name
+    names
         Such as ``r1/0``, or ``r1``.
 
     Raises
     ------
     OrderError
-        If nobody knows it.
+        If no coordinator answers for some time, or it does not know one of them.
     """
+    runs = runs_of(session, team)  # so that no answer later on means that there is none
+    return {name: _map_of(session, team, name, runs) for name in names}
+
+
+def _map_of(session: zenoh.Session, team: str, name: str, runs: Sequence[WireRun]) -> RobotMap:
     ask = ask_map_of_component if "/" in name else ask_robot_map
     message: MapMessage | None = ask(session, team, name)
     robot_map = None if message is None else MapAssembler().update(message)
     if robot_map is None or not robot_map.submaps:
-        raise OrderError(f"no coordinator of team {team} has a map of {name}")
+        there = ", ".join(sorted({run.robot for run in runs})) or "nobody"
+        raise OrderError(
+            f"no coordinator of team {team} has a map of {name}; there are maps of {there}"
+        )
     return robot_map
 
 
-def _silent(team: str) -> str:
-    return f"no coordinator of team {team} answers; is one running?"
+def _answer(team: str, ask: Callable[[float], T | None]) -> T:
+    """Return what a coordinator answers, None being no answer; one may be just starting.
+
+    Parameters
+    ----------
+    ask
+        Given how long it may take [s].
+    """
+    deadline = time.monotonic() + PATIENCE
+    while (left := deadline - time.monotonic()) > 0:
+        answer = ask(min(left, ANSWER_WITHIN))
+        if answer is not None:
+            return answer
+        time.sleep(PAUSE)
+    raise OrderError(
+        f"no coordinator of team {team} answered within {PATIENCE:g} s; is one running?"
+    )

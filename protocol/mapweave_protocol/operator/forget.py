@@ -9,13 +9,12 @@ from mapweave.cli import Command, argument
 from mapweave.errors import InvalidIdError
 from mapweave.ids import check_id
 from mapweave.orders import OrderKind
-from mapweave_protocol.link.asking import ask_runs
 from mapweave_protocol.operator.arguments import (
     add_order_arguments,
     add_reason_argument,
     connected,
 )
-from mapweave_protocol.operator.delivery import OrderError, deliver, orders_of
+from mapweave_protocol.operator.delivery import OrderError, deliver, orders_of, runs_of
 from mapweave_protocol.wire.messages import OrderMessage
 from mapweave_protocol.wire.orders.order_message import in_force, new_order_id, taking_back
 
@@ -65,15 +64,16 @@ def _boots(session: zenoh.Session, team: str, robot: str, boot: str | None) -> t
     OrderError
         If there are none.
     """
-    held = ask_runs(session, team)
-    if held is None:
-        raise OrderError(f"no coordinator of team {team} answers; is one running?")
+    held = runs_of(session, team)
     boots = tuple(run.boot for run in held if run.robot == robot)
     if boot is None and boots:
         return boots
     if boot in boots:
         return (boot,)
-    there = f"its runs are {', '.join(boots)}" if boots else "there is no map of it"
+    others = ", ".join(sorted({run.robot for run in held})) or "nobody"
+    there = (
+        f"its runs are {', '.join(boots)}" if boots else f"there is no map of it, but of {others}"
+    )
     raise OrderError(f"{robot}@{boot}: {there}" if boot else f"{robot}: {there}")
 
 

@@ -22,7 +22,7 @@ from mapweave_protocol.operator.delivery import (
     OrderError,
     deliver,
     latest_joint_map,
-    map_of,
+    maps_of,
     orders_of,
 )
 from mapweave_protocol.operator.making import order_between
@@ -55,10 +55,10 @@ def _run(options: argparse.Namespace, kind: OrderKind) -> int:
         if options.undo:
             orders = _undone(session, team, kind, pair, name, options.reason)
         else:
+            maps = maps_of(session, team, pair)
             meant = options.transform
             if meant is None and kind is OrderKind.PIN:
                 meant = found_between(latest_joint_map(session, team).alignments, pair)
-            maps = {each: map_of(session, team, each) for each in pair}
             orders = [
                 order_between(kind, maps, meant, by=name, reason=options.reason, time=time.time())
             ]
@@ -98,6 +98,7 @@ def _undone(
 ) -> list[OrderMessage]:
     """Return what takes back the orders about a pair, by the names they had or have."""
     meant = set(pair)
+    held = orders_of(session, team)
     now = {
         order.id
         for order in latest_joint_map(session, team).orders
@@ -105,7 +106,7 @@ def _undone(
     }
     found = [
         order
-        for order in in_force(orders_of(session, team))
+        for order in in_force(held)
         if order.kind is kind
         and (order.id in now or {end.component for end in order.ends} == meant)
     ]

@@ -15,7 +15,7 @@ from mapweave_protocol.operator.arguments import (
     connected,
     scan_or_place,
 )
-from mapweave_protocol.operator.delivery import OrderError, deliver, map_of, orders_of
+from mapweave_protocol.operator.delivery import OrderError, deliver, maps_of, orders_of
 from mapweave_protocol.operator.making import mark_at, mark_at_scan
 from mapweave_protocol.wire.messages import OrderMessage
 from mapweave_protocol.wire.orders.order_message import in_force, taking_back
@@ -46,7 +46,8 @@ def _run(options: argparse.Namespace) -> int:
         if options.undo:
             orders = _undone(session, team, options, name)
         else:
-            orders = [_made(map_of(session, team, options.robot), options, name)]
+            [robot_map] = maps_of(session, team, [options.robot]).values()
+            orders = [_made(robot_map, options, name)]
         deliver(session, team, orders)
     for order in orders:
         done = "taken back" if options.undo else f"marked on {order.ends[0].component}"

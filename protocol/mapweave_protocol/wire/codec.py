@@ -16,6 +16,7 @@ from typing import TypeVar
 import msgpack
 from pydantic import ValidationError
 
+from mapweave.text import in_words
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.budget import MIB, check_objects
 from mapweave_protocol.wire.dictionary import DICTIONARY
@@ -173,4 +174,4 @@ def _unextended(code: int, data: bytes) -> float | str:
 def _first_problem(error: ValidationError) -> str:
     first = error.errors(include_url=False, include_context=False, include_input=False)[0]
     place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}" if place else str(first["msg"])
+    return f"{place}: {in_words(first)}" if place else in_words(first)

@@ -87,9 +87,8 @@ def test_at_a_merge_and_at_an_unmerge_the_frame_changes_once_and_it_is_said(
             frames.append((message.joint.frame, message.joint.since))
     assert list(dict.fromkeys(frames)) == [("r2/0", 1), ("r1/0", 3), ("r2/0", 5)]
     assert [record.getMessage() for record in caplog.records] == [
-        "r2/0 is in the frame of r2/0 from version 1 on",
         "r2/0 is in the frame of r1/0 from version 3 on",
-        "r2/0 is in the frame of r2/0 from version 5 on",
+        "r2/0 is in its own frame again from version 5 on",
     ]
 
 

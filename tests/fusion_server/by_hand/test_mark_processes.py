@@ -114,7 +114,7 @@ def test_a_mark_is_taken_back_by_its_label_and_survives_a_restart_until_then(
         (("mark", "b/7", "victim", "--at", "1"), "no coordinator of team T has a map of b/7"),
         (("mark", "b", "victim"), "expected --at, or --undo in its place"),
         (("mark", "b", "victim", "--undo"), "no operator's mark 'victim' on the map of b is"),
-        (("pin", "a/0", "b/0", "--reason", "so"), "nothing was found between a/0 and b/0"),
+        (("pin", "a/0", "b/0", "--reason", "so"), "no coordinator of team T has a map of a/0"),
         (("forbid", "b/0", "b/0", "--reason", "so"), "b/0: expected two components"),
         (("forbid", "a/0", "b/0", "--undo", "--reason", "so"), "nothing forbidden between a/0"),
         (("forget", "c", "--reason", "so"), "c: there is no map of it"),

@@ -91,6 +91,15 @@ def test_show_tells_a_version_and_writes_it(run: Run, tmp_path: Path) -> None:
     assert run("show", "latest")[0].startswith("version 3: a/0 + b/0")
 
 
+@pytest.mark.parametrize("words", [["show", "latest"], ["history"], ["diff", "1", "2"], ["check"]])
+def test_the_store_of_another_team_is_not_taken_for_that_of_the_team(
+    run: Run, path: Path, words: list[str]
+) -> None:
+    another = f"mapweave: {path}: the store of team 'rescue', expected team 'other'"
+    assert run(*words, "--team", "other", status=1) == [another]
+    assert run(*words, "--team", "rescue") == run(*words)
+
+
 def test_diff_tells_who_joined_what_was_decided_and_how_much_wall(run: Run) -> None:
     told = run("diff", "2", "3")
     assert "c/0 is new" in told

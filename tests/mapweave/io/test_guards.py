@@ -41,5 +41,16 @@ def test_a_result_never_overwrites_an_input_or_another_result(tmp_path: Path) ->
         check_outputs([log], [log])
     with pytest.raises(FileError, match="two results"):
         check_outputs([out, out], [log])
-    with pytest.raises(FileError, match="no writable folder"):
+    with pytest.raises(FileError, match=f"there is no folder {tmp_path}/none$"):
         check_outputs([tmp_path / "none" / "out"], [log])
+    with pytest.raises(FileError, match=f"{log} is no folder"):
+        check_outputs([log / "out"], [])
+
+
+def test_that_a_folder_may_not_be_written_is_said_with_its_whole_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("os.access", lambda *_: False)  # as for any user but root
+    with pytest.raises(FileError, match=f"the folder {tmp_path} may not be written by this user"):
+        check_outputs([Path("out")], [])

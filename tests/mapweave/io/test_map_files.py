@@ -373,7 +373,7 @@ def test_fields_of_a_later_version_are_ignored(content: dict[str, Any], tmp_path
 def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_path: Path) -> None:
     path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
     message = refusal(load, write(tmp_path, without(content, steps)))
-    assert message.startswith(f"{path.removeprefix('.')}: Field required; expected a map file")
+    assert message.startswith(f"{path.removeprefix('.')}: is missing; expected a map file")
 
 
 @pytest.mark.parametrize(
@@ -390,7 +390,7 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
         (MAP, ["submaps", 0, "pose", 2], float("inf"), "submaps[0].pose[2]", "finite number"),
         (MAP, ["submaps", 0, "pose", 0], 1e9, "submaps[0].pose[0]", "less than"),
         (MAP, ["submaps", 0, "polylines", 0, 0], [0, 0, 1e5, 0], "submaps[0].polylines", "1000 m"),
-        (MAP, ["submaps", 0, "pose"], [1, 2], "submaps[0].pose[2]", "required"),
+        (MAP, ["submaps", 0, "pose"], [1, 2], "submaps[0].pose[2]", "is missing"),
         (MAP, ["submaps", 0, "polylines", 1], [], "submaps[0].polylines[1]", "at least 1 item"),
         (MAP, ["submaps", 0, "support", 1], [1, 1], "submaps[0]", "support[1] has 2 numbers, exp"),
         (MAP, ["submaps", 0, "support"], [[3, 4]], "submaps[0]", "support has 1 lists, expected 2"),
@@ -410,7 +410,7 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
         (TYPED, ["alignments", 0, "status"], "held", "alignments[0]", "expected a version if"),
         (TYPED, ["alignments", 0, "revoked_in"], None, "alignments[0]", "expected a version if"),
         (TYPED, ["alignments", 0, "set_aside_by", 0], ["a/0"], "alignments[0].set_aside_by[0][1]",
-         "required"),
+         "is missing"),
         (TYPED, ["alignments", 0, "cause", "kind"], "rival", "alignments[0].cause",
          "reason rival: expected"),
         (TYPED, ["alignments", 0, "cause", "distance"], "9", "alignments[0].cause",
@@ -437,12 +437,12 @@ def test_the_other_kind_of_map_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        (b"", "Invalid JSON"),
-        (b"FLASER 1 2 3", "Invalid JSON"),
-        (b"\xff\xfe\x00", "Invalid JSON"),
-        (b"[" * 100_000, "Invalid JSON"),
-        (json.dumps(MAP).encode()[:-9], "Invalid JSON"),
-        (b"[]", "should be an object"),
+        (b"", "is no JSON, or is cut off (at line 1 column"),
+        (b"FLASER 1 2 3", "is no JSON, or is cut off (at line 1 column"),
+        (b"\xff\xfe\x00", "is no JSON, or is cut off (at line 1 column"),
+        (b"[" * 100_000, "is no JSON, or is cut off (at line 1 column"),
+        (json.dumps(MAP).encode()[:-9], "is no JSON, or is cut off (at line 1 column"),
+        (b"[]", "expected an object"),
         (gzip.compress(json.dumps(MAP).encode())[:-30], "the gzip stream is cut off"),
     ],
 )
@@ -455,6 +455,16 @@ def test_what_is_no_map_file_is_refused(
     message = refusal(read, path)
     assert problem in message
     assert message.endswith("expected a map file (mapweave/map/1 or mapweave/joint/1)")
+
+
+def test_no_refusal_speaks_in_the_words_of_a_library(tmp_path: Path) -> None:
+    refusals = [
+        refusal(read_map, write(tmp_path, JOINT)),
+        refusal(load, write(tmp_path, {**MAP, "version": "x"})),
+        refusal(load, write(tmp_path, without(MAP, ["robot"]))),
+    ]
+    assert refusals[0].startswith("format: expected 'mapweave/map/1', found 'mapweave/joint/1'")
+    assert not [r for r in refusals if "Input" in r or "Field" in r or "JSON:" in r]
 
 
 @pytest.mark.parametrize("read", [read_map, read_joint, load])

@@ -26,10 +26,16 @@ def test_each_place_has_its_reason() -> None:
     assert told.split("; ")[1] == "tcp/nowhere.invalid:1: no such host"
 
 
-def test_who_listens_and_does_not_answer_is_told_apart_from_who_is_away() -> None:
+@pytest.mark.parametrize(
+    ("protocol", "hint"), [("tcp", "tls/{} and --tls DIR"), ("tls", "--tls DIR")]
+)
+def test_who_listens_and_does_not_answer_is_told_apart_and_what_one_with_keys_wants(
+    protocol: str, hint: str
+) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         taking = threading.Thread(target=lambda: server.accept()[0].close())
         taking.start()
-        endpoint = f"tcp/127.0.0.1:{server.getsockname()[1]}"
-        assert "not a router that lets us in" in reason_of([endpoint], None)
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        wanted = f"lets us in (if it has keys, give {hint.format(address)})"
+        assert reason_of([f"{protocol}/{address}"], None).endswith(wanted)
         taking.join()

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from mapweave_protocol.link.session import open_session
-from mapweave_protocol.narration.status import LISTENED, Team, listen, table_of
+from mapweave_protocol.narration.status import COLUMNS, LISTENED, Team, listen, table_of
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import (
@@ -57,6 +57,24 @@ def test_a_row_tells_how_far_the_coordinator_is_behind_and_what_was_refused() ->
     assert team.behind("r2") == 3
     assert r2[:2] == ["r2", "no"]
     assert r3 == ["r3", "yes", "says", "nothing"]
+
+
+def test_a_robot_that_is_gone_is_told_of_as_long_as_the_coordinator_holds_a_map_of_it() -> None:
+    held = [MapVersion(robot="r4", boot=boot, version=k) for boot, k in (("b1", 7), ("b2", 9))]
+    team = Team(here={"r1"}, coordinators={"c1"}, coordinator=_coordinator(maps=tuple(held)))
+    *_, r1, r4 = _lines(team)
+    assert r1 == ["r1", "yes", "says", "nothing"]
+    assert r4 == ["r4", "no", "gone", "7,", "9"]
+
+
+def test_each_column_of_figures_is_explained_where_the_command_is() -> None:
+    words = [str(MAPWEAVE), "status", "--help"]
+    told = " ".join(
+        subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    )
+    figures = [column for column in COLUMNS if " " in column]
+    assert figures
+    assert [column for column in figures if f"{column}: " not in told] == []
 
 
 def test_two_coordinators_and_none_are_told() -> None:

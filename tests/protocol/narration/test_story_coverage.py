@@ -28,7 +28,7 @@ def test_it_is_told_when_it_has_grown_by_half_and_not_before() -> None:
         "r1/0 + r2/0: 20 m²",
         "r1/0 + r2/0: 30 m²",
     ]
-    assert lines[0].endswith("goes on in 1 place, the widest 3.3 m")
+    assert lines[0].endswith("goes on at 1 frontier, the widest 3.3 m")
 
 
 def test_when_nothing_is_left_to_search_it_is_told_once() -> None:

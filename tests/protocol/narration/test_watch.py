@@ -79,7 +79,7 @@ def test_a_second_coordinator_is_told_once() -> None:
     tokens = [keys.COORDINATOR_LIVE.build(team="t", boot=boot) for boot in ("x", "y", "y")]
     lines = [line for key in tokens for line in watcher.tell(Arrival(key, b""))]
     two = "2 coordinators of the team are here, each with its own joint map: expected one"
-    assert lines == [two]
+    assert lines == ["the coordinator is here", two]
 
 
 def test_a_decision_is_told_when_it_is_new_with_confidence_and_reason() -> None:
@@ -177,7 +177,8 @@ def test_the_command_tells_what_happens_line_by_line(
             lines = [watching.stdout.readline() for _ in range(3)]
             watching.send_signal(signal.SIGTERM)
     assert all(re.match(r"\d\d:\d\d:\d\d ", line) for line in lines)
-    words = sorted(line.split()[1:3] for line in lines)
+    assert [line.split()[1] for line in lines] == ["before:"] * 3
+    words = sorted(line.split()[2:4] for line in lines)
     assert words == [["a", "is"], ["a:", "2"], ["joint", "map"]]
 
 

@@ -11,6 +11,7 @@ from typing import Self
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from mapweave.errors import FileError
+from mapweave.text import in_words
 from mapweave_protocol.link.security.roster import Member, Role, Roster
 
 AUTHORITY, CERTIFICATE, KEY, IDENTITY = "ca.pem", "cert.pem", "key.pem", "member.json"
@@ -127,5 +128,5 @@ def _read_identity(path: Path) -> _Identity:
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))
-        problem = f"{place}: {first['msg']}; expected what mapweave keys wrote"
+        problem = f"{place or 'its content'}: {in_words(first)}; expected what mapweave keys wrote"
         raise FileError(path, problem) from error

@@ -113,7 +113,7 @@ def test_the_frame_is_that_of_the_settings(tmp_path: Path) -> None:
         ("", ["is no list of settings", "expected"]),
         ("- map.pgm\n", ["is no list of settings", "expected"]),
         ("[1, 2", ["is no YAML", "expected"]),
-        ("image: map.pgm\norigin: [0, 0, 0]\n", ["resolution", "required"]),
+        ("image: map.pgm\norigin: [0, 0, 0]\n", ["resolution", "is missing"]),
         (SETTINGS.replace("0.1", "-1"), ["resolution", "greater"]),
         (SETTINGS.replace("0.1", ".nan"), ["resolution"]),
         (SETTINGS.replace("[-1.0, 2.0, 0.5]", "[1]"), ["origin"]),
