@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from mapweave.cli import Command, config_of
-from mapweave.errors import FileError
+from mapweave.config import Config
 from mapweave.ids import check_id
 from mapweave.io.map_files import write_joint
 from mapweave.maps import MadeWith
@@ -30,6 +30,7 @@ from mapweave_deploy.run.launcher import (
     with_free_port,
 )
 from mapweave_deploy.run.options import check_source, configure
+from mapweave_deploy.run.output_folder import OutputFolder
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.report import tell_files, tell_outcome, tell_verdicts
 from mapweave_deploy.run.team_plan import Member, simulated_team, team_from_logs
@@ -40,66 +41,25 @@ from mapweave_protocol.link.stopping import stop_on_signal
 NAP = 0.2  # [s]
 
 
-@dataclass(frozen=True, slots=True)
-class Folder:
-    """What is where in the output folder."""
-
-    path: Path
-
-    @property
-    def joint(self) -> Path:
-        """The joint map."""
-        return self.path / "joint.json"
-
-    @property
-    def picture(self) -> Path:
-        """Its picture."""
-        return self.path / "joint.png"
-
-    @property
-    def store(self) -> Path:
-        """The coordinator's store."""
-        return self.path / "store.sqlite"
-
-    @property
-    def logs(self) -> Path:
-        """What each process wrote."""
-        return self.path / "processes"
-
-    @property
-    def scans(self) -> Path:
-        """Simulated scans and truth."""
-        return self.path / "scans"
-
-    def create(self) -> None:
-        """Make the folders; what processes of an earlier team wrote goes.
-
-        Raises
-        ------
-        FileError
-            If that cannot be done.
-        """
-        try:
-            self.logs.mkdir(parents=True, exist_ok=True)
-            for log in self.logs.glob("*.log"):
-                log.unlink()
-        except OSError as error:
-            raise FileError(self.path, f"cannot be made a folder ({error.strerror})") from error
-
-
 def run(options: argparse.Namespace) -> int:
-    """Run the team; write and tell what it came to."""
+    """Check what can be wrong, and run the team."""
     check_source(options)
     check_id("team", options.team)
     config = config_of(options)
     if options.http is not None:
         live_page()  # told now where a package is missing, not by a process that ends
-    check_picture(Folder(options.output).picture)  # likewise, not when all is done
+    folder = OutputFolder(options.output)
+    check_picture(folder.picture)  # likewise, not when all is done
     # Whoever terminates a team means all of it, as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with folder.taken():
+        _run_in(folder, options, config)
+    return 0
+
+
+def _run_in(folder: OutputFolder, options: argparse.Namespace, config: Config) -> None:
+    """Run the team; write and tell what it came to."""
     console = Console()
-    folder = Folder(options.output)
-    folder.create()
     _say(console, [_source(options)])
     # The crew stops before what it wrote to is removed.
     with (
@@ -120,10 +80,9 @@ def run(options: argparse.Namespace) -> int:
         _say(console, tell_verdicts(outcome, plan.members, simulated=simulated))
         if options.stay or (plan.page is not None and _is_attended(console)):
             _stay(crew, plan, store, console)
-    return 0
 
 
-def _plan(options: argparse.Namespace, folder: Folder, store: Path, states: Path) -> Plan:
+def _plan(options: argparse.Namespace, folder: OutputFolder, store: Path, states: Path) -> Plan:
     return Plan(
         team=options.team,
         members=_members(options, folder),
@@ -139,7 +98,7 @@ def _plan(options: argparse.Namespace, folder: Folder, store: Path, states: Path
     )
 
 
-def _members(options: argparse.Namespace, folder: Folder) -> list[Member]:
+def _members(options: argparse.Namespace, folder: OutputFolder) -> list[Member]:
     if options.world is not None:
         return simulated_team(
             options.world, options.robots, options.seed, folder.scans, options.lidar
@@ -172,7 +131,7 @@ def _keep_store(written: Path, final: Path) -> Path:
     return final
 
 
-def _write(outcome: TeamOutcome, made_with: MadeWith, folder: Folder) -> None:
+def _write(outcome: TeamOutcome, made_with: MadeWith, folder: OutputFolder) -> None:
     write_joint(folder.joint, replace(outcome.joint, made_with=made_with))
     draw_joint(outcome.joint, folder.picture, outcome.maps)
 

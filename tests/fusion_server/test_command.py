@@ -75,11 +75,16 @@ def test_an_address_that_is_taken_ends_the_command_with_one_line(
     assert last == f"mapweave: --http: 127.0.0.1:{port}: Address already in use"
 
 
+@pytest.mark.parametrize("package", ["starlette.applications", "uvicorn", "prometheus_client"])
 def test_without_the_extra_the_page_is_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    package: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(sys.modules, "starlette.applications", None)
-    monkeypatch.delitem(sys.modules, "mapweave_fusion_server.web.server", raising=False)
+    monkeypatch.setitem(sys.modules, package, None)
+    for name in ("web.server", "monitoring"):
+        monkeypatch.delitem(sys.modules, f"mapweave_fusion_server.{name}", raising=False)
     monkeypatch.delattr(web, "server", raising=False)
     store = str(tmp_path / "store")
     assert main(["server", "--store", store, "--http", "127.0.0.1:0"]) == 1

@@ -10,7 +10,7 @@ from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.feed import Feed
 
-OPTIONAL = {"starlette", "uvicorn", "anyio", "h11", "click"}
+OPTIONAL = {"starlette", "uvicorn", "prometheus_client", "anyio", "h11", "click"}
 LivePage: TypeAlias = Callable[
     [HttpAddress, str, Store, Config, Feed, str], AbstractContextManager[HttpAddress]
 ]

@@ -251,13 +251,18 @@ def test_noise_in_a_bag_is_no_traceback(form: str, tmp_path: Path) -> None:
             assert "\n" not in str(error)
 
 
-def test_without_rosbags_a_bag_names_the_extra(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize("whole", [True, False], ids=["whole", "cut off"])
+@pytest.mark.parametrize("form", [*FORMS, "folder of db3", "folder of mcap"])
+def test_without_rosbags_every_bag_names_the_extra(
+    form: str, whole: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    path = write(tmp_path, "bag", {"/scan": lasers(1)})
-    monkeypatch.setitem(sys.modules, "rosbags.rosbag1", None)
+    file = write(tmp_path, form.split()[-1], {"/scan": lasers(20)})
+    if not whole:
+        file.write_bytes(file.read_bytes()[:-2000])
+    for name in [name for name in sys.modules if name.partition(".")[0] in ("rosbags", "apsw")]:
+        monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(MissingExtraError, match=r"mapweave\[bags\]"):
-        count_scans(path)
+        count_scans(file.parent if form.startswith("folder") else file)
 
 
 @pytest.mark.parametrize("topic", ["/front_scan", "/rear_scan"])

@@ -14,6 +14,7 @@ from mapweave.io.readers.ros_bags.bags import (
     BagFormat,
     SplitBag,
     WholeBag,
+    check_installed,
     damage_errors,
     open_bag,
     read_open_bag,
@@ -33,7 +34,10 @@ def read(path: Path, options: ReadOptions) -> Iterator[Scan]:
 def _open(path: Path, stack: ExitStack) -> Bag:
     """Open the recording by its metadata; file by file where there is none, or a file is cut."""
     parts = [(file, found) for file in _in_order(path) if (found := _format(file))]
-    if (path / "metadata.yaml").is_file() and all(form.is_whole(file) for file, form in parts):
+    told = (path / "metadata.yaml").is_file()
+    if parts or told:
+        check_installed()
+    if told and all(form.is_whole(file) for file, form in parts):
         from rosbags.rosbag2 import Reader
 
         try:

@@ -172,6 +172,7 @@ def open_bag(path: Path, bag_format: BagFormat, stack: ExitStack) -> Bag:
     MissingExtraError
         If `rosbags` is not installed.
     """
+    check_installed()
     if bag_format.is_whole(path):
         try:
             reader = stack.enter_context(bag_format.open_whole(path))
@@ -179,6 +180,11 @@ def open_bag(path: Path, bag_format: BagFormat, stack: ExitStack) -> Bag:
             return CutBag(path, bag_format.walk, "has an index that cannot be read")
         return WholeBag(reader, bag_format.encoding)
     return CutBag(path, bag_format.walk)
+
+
+def check_installed() -> None:
+    """Raise MissingExtraError if `rosbags` is not installed: before any of it is asked for."""
+    damage_errors()
 
 
 def damage_errors() -> tuple[type[Exception], ...]:
