@@ -23,6 +23,8 @@ pytestmark = pytest.mark.slow
 OFF = 0.25  # [m] that a scan may be off, as seen from the first
 SEED = 3
 WORLDS = ["doors", "moved", "glass", "mirrors", "colonnade", "twins"]
+# Whole and bare, or the same again: nothing tells such a building from another that is built alike.
+MAY_EXIST_TWICE = ("mirrors", "colonnade", "twins")
 
 
 def map_of(log: RobotLog) -> RobotMap:
@@ -65,7 +67,7 @@ def test_robots_map_a_hard_world_as_it_is_and_are_joined_rightly_or_not_at_all(
         assert_is_right(robot_map, truth)
     (found,) = align(maps[0], maps[1])
     assert_not_wrong(found, truths)
-    assert found.decision == "accepted" or world in ("twins", "colonnade"), found.reason
+    assert found.decision == "accepted" or world in MAY_EXIST_TWICE, found.reason
 
 
 def test_robots_one_of_whose_sensors_hangs_upside_down_unsaid_are_told_so(tmp_path: Path) -> None:
