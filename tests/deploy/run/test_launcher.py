@@ -20,6 +20,7 @@ class Noted(ProcessGroup):
         self.words: list[list[str]] = []
         self.told: list[dict[str, str]] = []
         self.niceness: list[int] = []
+        self.needed: list[bool] = []
 
     def start(  # type: ignore[override]  # nothing is started
         self,
@@ -28,11 +29,14 @@ class Noted(ProcessGroup):
         arguments: Sequence[str],
         environment: Mapping[str, str] | None = None,
         niceness: int = 0,
+        *,
+        needed: bool = True,
     ) -> None:
         """Note the words, and what only the process itself is told."""
         self.words.append([name, str(stage), *arguments])
         self.told.append(dict(environment or {}))
         self.niceness.append(niceness)
+        self.needed.append(needed)
 
 
 @pytest.mark.parametrize("config", [None, Path("robot.toml")])
@@ -48,6 +52,7 @@ def test_agents_and_coordinator_get_the_configuration_of_the_team(
     start_agent(crew, plan, member)
     coordinator, robot = crew.niceness
     assert coordinator < robot, "on one machine robots give way to whom all wait for"
+    assert crew.needed == [True, False], "a team goes on without a robot"
     server, agent = crew.words
     assert (server[2], agent[2]) == ("server", "agent")
     for words in (server, agent):
