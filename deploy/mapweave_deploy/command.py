@@ -33,11 +33,12 @@ from mapweave_deploy.run.launcher import (
     start_server,
     with_free_port,
 )
-from mapweave_deploy.run.options import check_source, configure
+from mapweave_deploy.run.options import check_ports, check_source, configure
 from mapweave_deploy.run.output_folder import OutputFolder
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.report import tell_files, tell_outcome, tell_verdicts
 from mapweave_deploy.run.team_plan import Member, simulated_team, team_from_logs
+from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import new_token
 from mapweave_fusion_server.web.loading import live_page
 from mapweave_protocol.link.stopping import stop_on_signal
@@ -66,15 +67,22 @@ def run(options: argparse.Namespace) -> int:
         live_page()  # told now where a package is missing, not by a process that ends
     folder = OutputFolder(options.output)
     check_picture(folder.picture)  # likewise, not when all is done
+    check_ports(options)
+    if options.store is not None and options.store.exists():
+        with Store(options.store, options.team):
+            pass  # it is one, of this team, and nobody has it
+    members = team_from_logs(options.logs, options.robots)
     # Whoever terminates a team means all of it, as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with folder.taken():
-        _run_in(folder, options, config)
+        _run_in(folder, members, options, config)
     return 0
 
 
-def _run_in(folder: OutputFolder, options: argparse.Namespace, config: Config) -> None:
-    """Run the team; write and tell what it came to."""
+def _run_in(
+    folder: OutputFolder, recorded: list[Member], options: argparse.Namespace, config: Config
+) -> None:
+    """Run the team, of `recorded` robots unless it is simulated; write what it came to."""
     console, made_with = Console(), MadeWith.of(config)
     _say(console, [_source(options)])
     # The crew stops before what it wrote to is removed.
@@ -83,7 +91,8 @@ def _run_in(folder: OutputFolder, options: argparse.Namespace, config: Config) -
         TemporaryDirectory(prefix="mapweave-") as states,
         ProcessGroup(folder.logs) as crew,
     ):
-        plan = _plan(options, folder, options.store or new, Path(states))
+        members = recorded or _simulated(options, folder)
+        plan = _plan(options, members, options.store or new, Path(states))
         _say(console, _how_to_watch(plan))
         with open_display(console, plan.members) as display:
             try:
@@ -119,10 +128,10 @@ def _keep_so_far(
         yield f"Kept: {what}: {folder.joint_so_far}; the store: {store}"
 
 
-def _plan(options: argparse.Namespace, folder: OutputFolder, store: Path, states: Path) -> Plan:
+def _plan(options: argparse.Namespace, members: list[Member], store: Path, states: Path) -> Plan:
     return Plan(
         team=options.team,
-        members=_members(options, folder),
+        members=members,
         rate=options.rate,
         listen=options.listen or free_endpoint(encrypted=options.tls is not None),
         store=store,
@@ -135,12 +144,8 @@ def _plan(options: argparse.Namespace, folder: OutputFolder, store: Path, states
     )
 
 
-def _members(options: argparse.Namespace, folder: OutputFolder) -> list[Member]:
-    if options.world is not None:
-        return simulated_team(
-            options.world, options.robots, options.seed, folder.scans, options.lidar
-        )
-    return team_from_logs(options.logs, options.robots)
+def _simulated(options: argparse.Namespace, folder: OutputFolder) -> list[Member]:
+    return simulated_team(options.world, options.robots, options.seed, folder.scans, options.lidar)
 
 
 @contextmanager

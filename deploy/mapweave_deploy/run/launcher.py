@@ -157,6 +157,8 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
     NoJointMapError
         If no robot placed a scan.
     """
+    for robot in plan.robots:
+        LinkSettings.of(plan.keys_of(Role.ROBOT, robot), None)  # what is wrong is told now
     follower = Follower(crew, plan.robots, display, plan.timeout)
     start_router(crew, plan)
     link = LinkSettings.of(plan.keys_of(Role.COORDINATOR), None)

@@ -5,8 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from mapweave_deploy.run.launcher import Plan, start_agent, start_server, with_free_port
+from mapweave.errors import MapweaveError
+from mapweave_deploy.run.display import Lines
+from mapweave_deploy.run.launcher import Plan, run_team, start_agent, start_server, with_free_port
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.team_plan import Member
 from mapweave_fusion_server.web.address import TOKEN_VARIABLE, HttpAddress
@@ -81,3 +84,17 @@ def test_a_port_is_chosen_once_so_that_the_page_comes_back_where_it_was() -> Non
     chosen = with_free_port(HttpAddress("127.0.0.1", 0))
     assert chosen.port > 0
     assert with_free_port(chosen) == chosen
+
+
+def test_keys_that_a_robot_lacks_are_told_before_anything_starts(tmp_path: Path) -> None:
+    member = Member(
+        "r1", Path("log"), (0, 9), "here", np.empty(0, dtype=np.int64), np.empty((0, 3))
+    )
+    plan = Plan(
+        *("t", [member], "max", "tls/127.0.0.1:1", tmp_path / "store", tmp_path, None),
+        keys=tmp_path / "keys",
+    )
+    crew = Noted(tmp_path)
+    with pytest.raises(MapweaveError, match=r"keys/robots/r1/ca.pem: missing"):
+        run_team(crew, plan, Lines(Console()))
+    assert crew.words == []
