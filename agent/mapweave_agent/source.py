@@ -13,7 +13,8 @@ NOMINAL_PERIOD = 0.2  # [s] between scans where the stamps do not tell; lidars t
 LONGEST_PAUSE = (
     10.0  # [s] between scans; a longer one is a clock that jumped, or a robot that slept
 )
-_NUMBER = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?|\.[0-9]{1,9}")
+SLOWEST, FASTEST = 0.001, 1_000_000.0  # times real time; beyond, nobody waits for the next scan
+_NUMBER = re.compile(r"([0-9]{1,12}(\.[0-9]{0,12})?|\.[0-9]{1,12})([eE][-+]?[0-9]{1,2})?")
 
 
 def parse_rate(text: str) -> float:
@@ -22,13 +23,16 @@ def parse_rate(text: str) -> float:
     Raises
     ------
     ValueError
-        If it is neither ``max`` nor a positive number.
+        If it is neither ``max`` nor a number from `SLOWEST` to `FASTEST`.
     """
     if text == "max":
         return math.inf
     rate = float(text) if _NUMBER.fullmatch(text) else 0.0
-    if not 0 < rate < math.inf:
-        raise ValueError(f"{text!r}: expected max, or how many times real time, such as 1 or 2.5")
+    if not SLOWEST <= rate <= FASTEST:
+        raise ValueError(
+            f"{text!r}: expected max, or how many times real time, such as 1 or 2.5, from"
+            f" {SLOWEST:g} to {FASTEST:.0f}"
+        )
     return rate
 
 

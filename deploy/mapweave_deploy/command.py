@@ -4,7 +4,7 @@ import argparse
 import signal
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,30 +15,47 @@ from rich.text import Text
 
 from mapweave.cli import Command, config_of
 from mapweave.config import Config
+from mapweave.errors import FileError, MapweaveError
 from mapweave.ids import check_id
 from mapweave.io.map_files import write_joint
 from mapweave.maps import MadeWith
 from mapweave.pictures.picture import check_picture, draw_joint
 from mapweave_deploy.run.display import open_display
+from mapweave_deploy.run.following import agent_of
 from mapweave_deploy.run.launcher import (
+    SERVER,
     Plan,
     TeamOutcome,
     free_endpoint,
+    latest_joint,
     page_of,
     run_team,
     start_server,
     with_free_port,
 )
-from mapweave_deploy.run.options import check_source, configure
+from mapweave_deploy.run.options import check_ports, check_source, configure
 from mapweave_deploy.run.output_folder import OutputFolder
 from mapweave_deploy.run.processes import ProcessGroup
 from mapweave_deploy.run.report import tell_files, tell_outcome, tell_verdicts
 from mapweave_deploy.run.team_plan import Member, simulated_team, team_from_logs
+from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import new_token
 from mapweave_fusion_server.web.loading import live_page
 from mapweave_protocol.link.stopping import stop_on_signal
 
 NAP = 0.2  # [s]
+
+
+class LostRobotsError(MapweaveError):
+    """Robots whose agents ended before they were done; the others' results are whole."""
+
+    def __init__(self, robots: Sequence[str], logs: Path) -> None:
+        agents = ", ".join(map(agent_of, robots))
+        super().__init__(
+            f"{agents} ended before the team was done: of what is left to map, nothing is in the"
+            f" joint map (what was said: {logs})"
+        )
+        self.robots = robots
 
 
 def run(options: argparse.Namespace) -> int:
@@ -50,16 +67,23 @@ def run(options: argparse.Namespace) -> int:
         live_page()  # told now where a package is missing, not by a process that ends
     folder = OutputFolder(options.output)
     check_picture(folder.picture)  # likewise, not when all is done
+    check_ports(options)
+    if options.store is not None and options.store.exists():
+        with Store(options.store, options.team):
+            pass  # it is one, of this team, and nobody has it
+    members = team_from_logs(options.logs, options.robots)
     # Whoever terminates a team means all of it, as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with folder.taken():
-        _run_in(folder, options, config)
+        _run_in(folder, members, options, config)
     return 0
 
 
-def _run_in(folder: OutputFolder, options: argparse.Namespace, config: Config) -> None:
-    """Run the team; write and tell what it came to."""
-    console = Console()
+def _run_in(
+    folder: OutputFolder, recorded: list[Member], options: argparse.Namespace, config: Config
+) -> None:
+    """Run the team, of `recorded` robots unless it is simulated; write what it came to."""
+    console, made_with = Console(), MadeWith.of(config)
     _say(console, [_source(options)])
     # The crew stops before what it wrote to is removed.
     with (
@@ -67,25 +91,47 @@ def _run_in(folder: OutputFolder, options: argparse.Namespace, config: Config) -
         TemporaryDirectory(prefix="mapweave-") as states,
         ProcessGroup(folder.logs) as crew,
     ):
-        plan = _plan(options, folder, options.store or new, Path(states))
+        members = recorded or _simulated(options, folder)
+        plan = _plan(options, members, options.store or new, Path(states))
         _say(console, _how_to_watch(plan))
         with open_display(console, plan.members) as display:
-            outcome = run_team(crew, plan, display)
+            try:
+                outcome = run_team(crew, plan, display)
+            except (KeyboardInterrupt, MapweaveError):
+                crew.stop(lowest_stage=SERVER)  # it stores what is pending
+                _say(console, _keep_so_far(plan, options.store, made_with, folder))
+                raise
         store = _keep_store(plan.store, options.store or folder.store)
-        _write(outcome, MadeWith.of(config), folder)
-        _say(console, tell_outcome(outcome, plan.members))
-        files = [("picture", folder.picture), ("joint map", folder.joint), ("store", store)]
-        _say(console, tell_files([*files, ("what each process said", folder.logs)]))
-        simulated = options.world is not None
-        _say(console, tell_verdicts(outcome, plan.members, simulated=simulated))
-        if options.stay or (plan.page is not None and _is_attended(console)):
-            _stay(crew, plan, store, console)
+        staying = options.stay or (plan.page is not None and _is_attended(console))
+        if staying:
+            start_server(crew, plan, store)  # it serves while results are computed
+        _tell(outcome, plan, options, made_with, folder, store, console)
+        if staying:
+            _stay(crew, plan, console)
+    if outcome.lost:
+        raise LostRobotsError(outcome.lost, folder.logs)
 
 
-def _plan(options: argparse.Namespace, folder: OutputFolder, store: Path, states: Path) -> Plan:
+def _keep_so_far(
+    plan: Plan, given: Path | None, made_with: MadeWith, folder: OutputFolder
+) -> Iterator[str]:
+    """Keep what a team had that was stopped, and say where; earlier results stay as they are."""
+    try:
+        joint = latest_joint(plan.store, plan.team) if plan.store.exists() else None
+    except FileError as error:
+        yield f"Nothing is kept: {error}"
+        return
+    if joint is not None:
+        write_joint(folder.joint_so_far, replace(joint, made_with=made_with))
+        store = _keep_store(plan.store, given or folder.store_so_far)
+        what = f"the joint map so far, version {joint.version}"
+        yield f"Kept: {what}: {folder.joint_so_far}; the store: {store}"
+
+
+def _plan(options: argparse.Namespace, members: list[Member], store: Path, states: Path) -> Plan:
     return Plan(
         team=options.team,
-        members=_members(options, folder),
+        members=members,
         rate=options.rate,
         listen=options.listen or free_endpoint(encrypted=options.tls is not None),
         store=store,
@@ -98,12 +144,8 @@ def _plan(options: argparse.Namespace, folder: OutputFolder, store: Path, states
     )
 
 
-def _members(options: argparse.Namespace, folder: OutputFolder) -> list[Member]:
-    if options.world is not None:
-        return simulated_team(
-            options.world, options.robots, options.seed, folder.scans, options.lidar
-        )
-    return team_from_logs(options.logs, options.robots)
+def _simulated(options: argparse.Namespace, folder: OutputFolder) -> list[Member]:
+    return simulated_team(options.world, options.robots, options.seed, folder.scans, options.lidar)
 
 
 @contextmanager
@@ -131,9 +173,23 @@ def _keep_store(written: Path, final: Path) -> Path:
     return final
 
 
-def _write(outcome: TeamOutcome, made_with: MadeWith, folder: OutputFolder) -> None:
+def _tell(
+    outcome: TeamOutcome,
+    plan: Plan,
+    options: argparse.Namespace,
+    made_with: MadeWith,
+    folder: OutputFolder,
+    store: Path,
+    console: Console,
+) -> None:
+    """Write the results, and tell what came of it."""
     write_joint(folder.joint, replace(outcome.joint, made_with=made_with))
     draw_joint(outcome.joint, folder.picture, outcome.maps)
+    _say(console, tell_outcome(outcome, plan.members))
+    files = [("picture", folder.picture), ("joint map", folder.joint), ("store", store)]
+    _say(console, tell_files([*files, ("what each process said", folder.logs)]))
+    simulated = options.world is not None
+    _say(console, tell_verdicts(outcome, plan.members, simulated=simulated))
 
 
 def _source(options: argparse.Namespace) -> str:
@@ -152,10 +208,9 @@ def _is_attended(console: Console) -> bool:
     return console.is_terminal and sys.stdin.isatty()
 
 
-def _stay(crew: ProcessGroup, plan: Plan, store: Path, console: Console) -> None:
-    """Serve what was stored until Ctrl-C, which is the way to end this."""
+def _stay(crew: ProcessGroup, plan: Plan, console: Console) -> None:
+    """Let router and coordinator serve until Ctrl-C, which is the way to end this."""
     stopping = stop_on_signal()
-    start_server(crew, plan, store)
     _say(console, [*page_of(crew, plan), "Router and coordinator stay; Ctrl-C ends them."])
     while not stopping():
         crew.check()

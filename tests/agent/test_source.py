@@ -54,14 +54,16 @@ def test_at_the_maximum_every_scan_is_due_at_once() -> None:
     assert dues([0.0, 5.0, math.nan], math.inf) == [0.0, 0.0, 0.0]
 
 
-@pytest.mark.parametrize(("text", "rate"), [("max", math.inf), ("1", 1.0), ("2.5", 2.5)])
+@pytest.mark.parametrize(
+    ("text", "rate"), [("max", math.inf), ("1", 1.0), ("2.5", 2.5), ("1e3", 1000.0)]
+)
 def test_a_rate_is_max_or_a_multiple(text: str, rate: float) -> None:
     assert parse_rate(text) == rate
 
 
-@pytest.mark.parametrize("text", ["", "0", "-1", "inf", "nan", "1e9", "fast", "0.0"])
-def test_any_other_rate_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="expected max"):
+@pytest.mark.parametrize("text", ["", "0", "-1", "inf", "nan", "1e9", "1e-9", "fast", "0.0"])
+def test_any_other_rate_is_refused_with_the_limits(text: str) -> None:
+    with pytest.raises(ValueError, match=r"expected max.* from 0.001 to 1000000$"):
         parse_rate(text)
 
 

@@ -1,8 +1,8 @@
 """Runs a team as processes on this machine, from its start to its joint map."""
 
-import logging
 import socket
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,15 +11,13 @@ import zenoh
 from mapweave.errors import MapweaveError
 from mapweave.maps import JointMap, RobotMap
 from mapweave_deploy.run.display import Display
+from mapweave_deploy.run.following import POLL, Follower, TeamTimeoutError, agent_of
 from mapweave_deploy.run.processes import ProcessGroup
-from mapweave_deploy.run.recorder import Recorder, is_done
+from mapweave_deploy.run.recorder import Recorder
 from mapweave_deploy.run.team_plan import Member
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import TOKEN_VARIABLE, HttpAddress
-from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.asking import ask_robot_map
 from mapweave_protocol.link.assembler import MapAssembler
-from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.security import roster
 from mapweave_protocol.link.security.folder import place_of
 from mapweave_protocol.link.security.roster import Role
@@ -33,21 +31,6 @@ ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router 
 ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things
 PAGE_PATIENCE = 60.0  # [s] for the coordinator to serve its page, while agents start as well
 AGENT_NICENESS = 12  # of agents, beside a router and a coordinator on the same machine
-POLL = 0.2  # [s] after which a dead process or the end is noticed
-CAPACITY = 100_000  # messages waiting to be counted
-
-_log = logging.getLogger(__name__)
-
-
-class TeamTimeoutError(MapweaveError):
-    """A team that was not done in time."""
-
-    def __init__(self, seconds: float, waiting_for: list[str]) -> None:
-        super().__init__(
-            f"the team was not done within {seconds:g} s, still to come: {', '.join(waiting_for)}"
-        )
-        self.seconds = seconds
-        self.waiting_for = waiting_for
 
 
 class NoJointMapError(MapweaveError):
@@ -135,11 +118,14 @@ class TeamOutcome:
         By robot, its last map.
     recorder
         What was sent, and how far everybody came.
+    lost
+        Robots whose agents ended before they were done; of these, the maps up to there.
     """
 
     joint: JointMap
     maps: dict[str, RobotMap]
     recorder: Recorder
+    lost: Sequence[str] = ()
 
 
 def free_endpoint(*, encrypted: bool = False) -> str:
@@ -165,32 +151,28 @@ def run_team(crew: ProcessGroup, plan: Plan, display: Display) -> TeamOutcome:
     Raises
     ------
     ChildDiedError
-        If one of the processes ends.
+        If router or coordinator ends, or the last of the robots.
     TeamTimeoutError
         If it takes too long.
+    NoJointMapError
+        If no robot placed a scan.
     """
-    deadline = None if plan.timeout is None else time.monotonic() + plan.timeout
+    for robot in plan.robots:
+        LinkSettings.of(plan.keys_of(Role.ROBOT, robot), None)  # what is wrong is told now
+    follower = Follower(crew, plan.robots, display, plan.timeout)
     start_router(crew, plan)
-    recorder, inbox = Recorder(), Inbox(CAPACITY)
     link = LinkSettings.of(plan.keys_of(Role.COORDINATOR), None)
     with (
         open_session([plan.listen], patience=ROUTER_PATIENCE, link=link) as session,
-        session.declare_subscriber(everything(plan.team), inbox.put),
+        session.declare_subscriber(everything(plan.team), follower.inbox.put),
     ):
         _start_all(crew, plan, session)
         for line in page_of(crew, plan):
             display.say(line)
-        while not is_done(plan.robots, recorder.statuses):
-            _follow(crew, inbox, recorder, display)
-            _check_time(plan, deadline, _unfinished(plan, recorder))
-        # The coordinator publishes what is pending when it is told to stop, so all that is left
-        # to see to is that it has got everybody's last map.
-        while missing := _not_at_coordinator(session, plan, recorder):
-            _follow(crew, inbox, recorder, display)
-            _check_time(plan, deadline, [f"map of {robot}" for robot in missing])
+        follower.follow(session, plan.team)
         crew.stop(lowest_stage=SERVER)
-        _drain(inbox, recorder, display)
-    return _read_outcome(plan, recorder)
+        follower.drain()
+    return _read_outcome(plan, follower)
 
 
 def start_router(crew: ProcessGroup, plan: Plan) -> None:
@@ -259,7 +241,7 @@ def start_agent(crew: ProcessGroup, plan: Plan, member: Member) -> None:
     reach = [*plan.connection, *plan.proof(Role.ROBOT, member.robot)]
     arguments = ["agent", *source, *scans, *state, *reach, *plan.computing]
     # On one machine all wait for the coordinator: robots' own computers do not compete with it.
-    crew.start(f"agent {member.robot}", AGENT, arguments, niceness=AGENT_NICENESS)
+    crew.start(agent_of(member.robot), AGENT, arguments, niceness=AGENT_NICENESS, needed=False)
 
 
 def _listens(host: str, port: int) -> bool:
@@ -270,67 +252,24 @@ def _listens(host: str, port: int) -> bool:
         return False
 
 
-def _follow(crew: ProcessGroup, inbox: Inbox, recorder: Recorder, display: Display) -> None:
-    """Take in what arrives for a moment, show it, and look after the processes."""
-    arrival = inbox.get(POLL)
-    if arrival is not None:
-        for line in recorder.take(arrival):
-            display.say(line)
-    display.update(recorder.statuses)
-    crew.check()
-
-
-def _drain(inbox: Inbox, recorder: Recorder, display: Display) -> None:
-    while (arrival := inbox.get(0.0)) is not None:
-        for line in recorder.take(arrival):
-            display.say(line)
-
-
-def _check_time(plan: Plan, deadline: float | None, waiting_for: list[str]) -> None:
-    if plan.timeout is not None and deadline is not None and time.monotonic() > deadline:
-        raise TeamTimeoutError(plan.timeout, waiting_for)
-
-
-def _unfinished(plan: Plan, recorder: Recorder) -> list[str]:
-    """Return who has not finished, or that comparing is what is left."""
-    finished = {r for r, status in recorder.statuses.items() if status.state == "finished"}
-    return [r for r in plan.robots if r not in finished] or ["comparing the last maps"]
-
-
-def _not_at_coordinator(session: zenoh.Session, plan: Plan, recorder: Recorder) -> list[str]:
-    """Return the robots whose last map the coordinator has not got."""
-    missing = []
-    for robot in plan.robots:
-        status = recorder.statuses[robot]
-        held = _ask(session, plan.team, robot)
-        is_last = held is not None and (held.boot, held.version) == (
-            status.boot,
-            status.map_version,
-        )
-        if not is_last and status.submaps > 0:
-            missing.append(robot)
-    return missing
-
-
-def _ask(session: zenoh.Session, team: str, robot: str) -> MapMessage | None:
-    """Return the coordinator's map of `robot`, None as well if the answer is not valid."""
-    try:
-        return ask_robot_map(session, team, robot)
-    except MessageError as error:
-        _log.warning("answer ignored, %s", error)
-        return None
-
-
-def _read_outcome(plan: Plan, recorder: Recorder) -> TeamOutcome:
-    """Return what the coordinator, now stopped, left in its store."""
-    with Store(plan.store, plan.team) as store:
+def latest_joint(path: Path, team: str) -> JointMap | None:
+    """Return the last joint map that a coordinator, now stopped, left in its store."""
+    with Store(path, team) as store:
         latest = store.version(store.latest_version)
-        maps = [store.map_of(robot) for robot in plan.robots]
-    if latest is None:
+    return None if latest is None else decode(JointMapMessage, latest).unpack()
+
+
+def _read_outcome(plan: Plan, follower: Follower) -> TeamOutcome:
+    """Return what the coordinator, now stopped, left in its store."""
+    joint = latest_joint(plan.store, plan.team)
+    if joint is None:
         raise NoJointMapError("the robots placed no scan, so there is no joint map")
+    with Store(plan.store, plan.team) as store:
+        maps = [store.map_of(robot) for robot in plan.robots]
     robot_maps = [MapAssembler().update(decode(MapMessage, payload)) for payload in maps if payload]
     return TeamOutcome(
-        decode(JointMapMessage, latest).unpack(),
+        joint,
         {robot_map.robot: robot_map for robot_map in robot_maps if robot_map is not None},
-        recorder,
+        follower.recorder,
+        follower.lost,
     )

@@ -2,9 +2,12 @@
 
 import argparse
 import re
+import socket
 from pathlib import Path
 
 from mapweave.cli import add_config_argument, argument, positive
+from mapweave.errors import ArgumentError
+from mapweave_agent.source import parse_rate
 from mapweave_deploy.sim.lidars import LIDARS
 from mapweave_deploy.sim.settings import SETTINGS
 from mapweave_fusion_server.web.address import loopback_address
@@ -12,6 +15,7 @@ from mapweave_protocol.link.arguments import DEFAULT_TEAM
 from mapweave_protocol.link.session import MAX_PORT
 
 DEFAULT_ROBOTS = 3
+MOST_ROBOTS = 64  # each is an agent on this machine, with processes of its own that compute
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -28,6 +32,35 @@ def check_source(options: argparse.Namespace) -> None:
         options.wrong_usage("expected either logs or --world")
     if options.lidar and options.world is None:
         options.wrong_usage("--lidar is of simulated robots: expected --world")
+    count = options.robots * max(1, len(options.logs))
+    if count > MOST_ROBOTS:
+        options.wrong_usage(f"--robots: {count} robots in all, expected {MOST_ROBOTS} at most")
+
+
+def check_ports(options: argparse.Namespace) -> None:
+    """Find out now, not by processes that end, whether router and page can listen.
+
+    Raises
+    ------
+    ArgumentError
+        If they cannot.
+    """
+    if options.listen is not None:
+        host, _, port = options.listen.partition("/")[2].rpartition(":")
+        _check_port("--listen", host, int(port))
+    if options.http is not None:
+        _check_port("--http", options.http.host, options.http.port)
+
+
+def _check_port(option: str, host: str, port: int) -> None:
+    name = host.strip("[]")
+    family = socket.AF_INET6 if ":" in name else socket.AF_INET
+    try:
+        with socket.socket(family) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as who listens does
+            probe.bind((name, port))
+    except OSError as error:
+        raise ArgumentError(option, f"{host}:{port}: {error.strerror}") from error
 
 
 def _add_source(parser: argparse.ArgumentParser) -> None:
@@ -143,8 +176,7 @@ def _whole(text: str, least: int) -> int:
 
 
 def _rate(text: str) -> str:
-    if text != "max":
-        positive(text)
+    parse_rate(text)
     return text
 
 

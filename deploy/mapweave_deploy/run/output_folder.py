@@ -32,6 +32,16 @@ class OutputFolder:
         return self.path / "store.sqlite"
 
     @property
+    def joint_so_far(self) -> Path:
+        """The joint map of a team that was stopped; that of an earlier one stays."""
+        return self.path / "joint-so-far.json"
+
+    @property
+    def store_so_far(self) -> Path:
+        """Its coordinator's store."""
+        return self.path / "store-so-far.sqlite"
+
+    @property
     def logs(self) -> Path:
         """What each process wrote."""
         return self.path / "processes"

@@ -33,7 +33,7 @@ class ChildDiedError(MapweaveError):
     def __init__(self, name: str, status: int, log: Path) -> None:
         how = f"was killed by {signal.Signals(-status).name}" if status < 0 else f"ended ({status})"
         said = " | ".join(last_lines(log, TOLD_LINES)) or "it wrote nothing"
-        super().__init__(f"{name} {how}, the team is stopped; its last words: {said} (all: {log})")
+        super().__init__(f"{name} {how}; its last words: {said} (all: {log})")
         self.name = name
         self.status = status
         self.log = log
@@ -41,12 +41,22 @@ class ChildDiedError(MapweaveError):
 
 @dataclass(frozen=True, slots=True)
 class Child:
-    """A process; those of a higher stage are stopped before those of a lower one."""
+    """A process; those of a higher stage are stopped before those of a lower one.
+
+    Without one that is `needed`, the others cannot go on.
+    """
 
     name: str
     stage: int
     process: subprocess.Popen[bytes]
     log: Path
+    needed: bool = True
+
+    @property
+    def death(self) -> ChildDiedError | None:
+        """How it ended; None while it runs."""
+        status = self.process.poll()
+        return None if status is None else ChildDiedError(self.name, status, self.log)
 
     def terminate(self) -> None:
         """Ask it to stop; what it has started is its own business."""
@@ -79,6 +89,8 @@ class ProcessGroup:
         arguments: Sequence[str],
         environment: Mapping[str, str] | None = None,
         niceness: int = 0,
+        *,
+        needed: bool = True,
     ) -> Child:
         """Start ``mapweave`` with `arguments` as a process of its own, so much nicer than this one.
 
@@ -99,16 +111,25 @@ class ProcessGroup:
         if niceness:
             own = os.getpriority(os.PRIO_PROCESS, 0)
             os.setpriority(os.PRIO_PROCESS, process.pid, own + niceness)
-        child = Child(name, stage, process, log)
+        child = Child(name, stage, process, log, needed)
         self.children.append(child)
         return child
 
     def check(self) -> None:
-        """Raise ChildDiedError if one of the processes has ended."""
+        """Raise ChildDiedError if a process has ended that is needed."""
         for child in self.children:
-            status = child.process.poll()
-            if status is not None:
-                raise ChildDiedError(child.name, status, child.log)
+            if child.needed and (death := child.death) is not None:
+                raise death
+
+    def take_lost(self) -> list[ChildDiedError]:
+        """Return how processes ended that are not needed, once each; nothing they started stays."""
+        lost = []
+        for child in list(self.children):
+            if not child.needed and (death := child.death) is not None:
+                lost.append(death)
+                child.kill()
+                self.children.remove(child)
+        return lost
 
     def stop(self, lowest_stage: int = 0) -> None:
         """Stop the processes from `lowest_stage` up, the highest stage first."""

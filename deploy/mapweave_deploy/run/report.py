@@ -19,6 +19,7 @@ from mapweave_deploy.run.key_scans import APART, key_scan_bytes, path_length
 from mapweave_deploy.run.launcher import TeamOutcome
 from mapweave_deploy.run.occupancy import grid_bytes
 from mapweave_deploy.run.team_plan import Member
+from mapweave_protocol.wire.messages import StatusMessage
 
 WORLD_LIMITS = Limits(0.3, np.radians(3.0))
 LOG_LIMITS = Limits(0.5, np.radians(5.0))
@@ -48,12 +49,19 @@ def tell_files(files: Sequence[tuple[str, Path]]) -> Iterator[str]:
 def _tell_robots(outcome: TeamOutcome, members: Sequence[Member]) -> Iterator[str]:
     yield "Robots:"
     for member in members:
-        status = outcome.recorder.statuses[member.robot]
-        parts = f", {status.components} components" if status.components > 1 else ""
-        yield (
-            f"  {member.robot}: {status.scans_placed} of {status.scans_seen} scans placed,"
-            f" {counted(status.submaps, 'submap')}{parts}"
-        )
+        status = outcome.recorder.statuses.get(member.robot)
+        ended = "; ended before it was done" if member.robot in outcome.lost else ""
+        yield f"  {member.robot}: {_tell_robot(status)}{ended}"
+
+
+def _tell_robot(status: StatusMessage | None) -> str:
+    if status is None:
+        return "was never heard"
+    parts = f", {status.components} components" if status.components > 1 else ""
+    return (
+        f"{status.scans_placed} of {status.scans_seen} scans placed,"
+        f" {counted(status.submaps, 'submap')}{parts}"
+    )
 
 
 def _tell_alignments(alignments: Sequence[Alignment]) -> Iterator[str]:

@@ -80,6 +80,18 @@ def test_a_killed_process_is_told_by_its_name_and_signal(tmp_path: Path) -> None
             crew.check()
 
 
+def test_of_processes_that_are_not_needed_it_is_told_once_how_they_ended(tmp_path: Path) -> None:
+    with ProcessGroup(tmp_path) as crew:
+        start_router(crew)
+        words = ["router", "--listen", "nonsense"]
+        lost = crew.start("agent r2", 2, words, needed=False)
+        lost.process.wait()
+        crew.check()
+        (told,) = crew.take_lost()
+        assert (told.name, told.status) == ("agent r2", 1)
+        assert crew.take_lost() == []
+
+
 def test_a_failed_process_is_told_with_its_last_words(tmp_path: Path) -> None:
     with ProcessGroup(tmp_path) as crew:
         child = crew.start("router", 0, ["router", "--listen", "nonsense"])

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from mapweave.io.map_files import read_joint
+from mapweave_fusion_server.store import Store
+
 PROGRAM = [sys.executable, "-c", "import sys; from mapweave.cli import main; sys.exit(main())"]
 DEADLINE = 60.0  # [s], for a machine with much else to do
 
@@ -23,7 +26,7 @@ def running_team(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", set[in
     """Run a team of two in real time, which takes minutes; give it and its process groups."""
     command = [*PROGRAM, "team", "--world", "arena", "--robots", "2", "--rate", "1"]
     with subprocess.Popen(
-        [*command, "--output", str(folder)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        [*command, "--output", str(folder)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True,
     ) as team:  # fmt: skip
         try:
@@ -71,14 +74,39 @@ def _agent(robot: str, groups: set[int]) -> int:
     return agent
 
 
-def test_a_killed_agent_ends_the_team_with_one_line_that_names_it(tmp_path: Path) -> None:
+def test_of_a_killed_agent_it_is_told_at_once_and_the_last_one_ends_the_team_by_name(
+    tmp_path: Path,
+) -> None:
     with running_team(tmp_path) as (team, groups):
         assert len(groups) == 4  # router, coordinator, two agents
-        os.kill(_agent("r2", groups), signal.SIGKILL)
+        assert team.stdout is not None
+        first, last = (_agent(robot, groups) for robot in ("r2", "r1"))
+        os.kill(first, signal.SIGKILL)
+        told = next(line for line in team.stdout if line.startswith("agent"))
+        assert re.fullmatch(r"agent r2 was killed by SIGKILL;.*; the others go on\n", told)
+        assert team.poll() is None
+        os.kill(last, signal.SIGKILL)
         assert team.wait(DEADLINE) == 1
         assert team.stderr is not None
-        assert re.fullmatch(r"mapweave: agent r2 was killed by SIGKILL.*\n", team.stderr.read())
+        assert re.fullmatch(r"mapweave: agent r1 was killed by SIGKILL.*\n", team.stderr.read())
     until(lambda: _nothing_left(groups))
+
+
+def test_a_team_that_is_stopped_keeps_what_it_has_and_says_where(tmp_path: Path) -> None:
+    with running_team(tmp_path) as (team, _):
+        assert team.stdout is not None
+        assert any(line.startswith("joint map 1:") for line in team.stdout)
+        team.send_signal(signal.SIGINT)
+        assert team.wait(DEADLINE) == 130
+        *_, last = team.stdout
+    kept = re.fullmatch(
+        r"Kept: the joint map so far, version (\d+): (.*/joint-so-far.json); the store: (.*)\n",
+        last,
+    )
+    assert kept is not None
+    assert read_joint(Path(kept[2])).version == int(kept[1])
+    with Store(Path(kept[3]), "team") as store:
+        assert store.latest_version == int(kept[1])
 
 
 @pytest.mark.parametrize(
