@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
@@ -78,6 +79,8 @@ class Service:
         self._store = store
         self._story = Story()
         latest = last_version(store)
+        if latest is not None:
+            deque(self._story.joined(latest), maxlen=0)  # it was told before this start
         self._frames = frames_of(latest)
         self._coordinator = Coordinator(parameters, latest, store.latest_version)
         self._intake = Intake(self._coordinator, store, self._story)

@@ -32,6 +32,25 @@ def test_after_a_restart_the_latest_is_published_again_and_numbering_goes_on(
     assert network.groups(following) == [["a/0", "b/0"], ["c/0"]]
 
 
+def test_what_was_told_before_a_restart_is_not_told_again_in_the_next_version(
+    network: Network,
+    finished_team: ServerProcess,
+    start_server: StartServer,
+    make_map: MakeMap,
+) -> None:
+    assert "a/0 and b/0: accepted" in finished_team.log
+    finished_team.stop(signal.SIGKILL)
+    server = start_server()
+    watcher = network.watcher()
+    with network.robot("c") as c:
+        c.publish_map(make_map("c"))
+        while watcher.next().version < 4:
+            pass
+    server.stop()
+    assert "c: 1 submap" in server.log
+    assert "a/0" not in server.log
+
+
 def test_nothing_new_after_a_restart_makes_no_version(
     network: Network,
     finished_team: ServerProcess,
