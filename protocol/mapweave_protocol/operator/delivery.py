@@ -109,14 +109,19 @@ def maps_of(session: zenoh.Session, team: str, names: Sequence[str]) -> dict[str
     return {name: _map_of(session, team, name, runs) for name in names}
 
 
+def whose_maps(runs: Sequence[WireRun]) -> str:
+    """Return of whom there are maps, in words."""
+    robots = sorted({run.robot for run in runs})
+    return f"maps of {', '.join(robots)}" if robots else "none of anybody yet"
+
+
 def _map_of(session: zenoh.Session, team: str, name: str, runs: Sequence[WireRun]) -> RobotMap:
     ask = ask_map_of_component if "/" in name else ask_robot_map
     message: MapMessage | None = ask(session, team, name)
     robot_map = None if message is None else MapAssembler().update(message)
     if robot_map is None or not robot_map.submaps:
-        there = ", ".join(sorted({run.robot for run in runs})) or "nobody"
         raise OrderError(
-            f"no coordinator of team {team} has a map of {name}; there are maps of {there}"
+            f"no coordinator of team {team} has a map of {name}; it has {whose_maps(runs)}"
         )
     return robot_map
 

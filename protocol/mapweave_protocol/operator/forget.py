@@ -14,7 +14,7 @@ from mapweave_protocol.operator.arguments import (
     add_reason_argument,
     connected,
 )
-from mapweave_protocol.operator.delivery import OrderError, deliver, orders_of, runs_of
+from mapweave_protocol.operator.delivery import OrderError, deliver, orders_of, runs_of, whose_maps
 from mapweave_protocol.wire.messages import OrderMessage
 from mapweave_protocol.wire.orders.order_message import in_force, new_order_id, taking_back
 
@@ -70,10 +70,8 @@ def _boots(session: zenoh.Session, team: str, robot: str, boot: str | None) -> t
         return boots
     if boot in boots:
         return (boot,)
-    others = ", ".join(sorted({run.robot for run in held})) or "nobody"
-    there = (
-        f"its runs are {', '.join(boots)}" if boots else f"there is no map of it, but of {others}"
-    )
+    none = f"there is no map of it; the coordinator has {whose_maps(held)}"
+    there = f"its runs are {', '.join(boots)}" if boots else none
     raise OrderError(f"{robot}@{boot}: {there}" if boot else f"{robot}: {there}")
 
 

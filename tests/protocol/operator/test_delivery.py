@@ -73,6 +73,6 @@ def test_a_coordinator_that_answers_a_little_later_is_waited_for(
 def test_of_a_robot_that_does_not_exist_is_said_whose_maps_there_are(
     session: zenoh.Session, endpoint: str, team: str
 ) -> None:
-    unknown = f"no coordinator of team {team} has a map of r7/0; there are maps of r1$"
+    unknown = f"no coordinator of team {team} has a map of r7/0; it has maps of r1$"
     with _coordinator(endpoint, team, b""), pytest.raises(OrderError, match=unknown):
         maps_of(session, team, ["r7/0"])
