@@ -102,6 +102,15 @@ def test_the_end_of_mapping_is_told_once() -> None:
     assert lines == ["a has finished: 9 scans, 9 placed"]
 
 
+def test_a_status_of_before_or_of_another_run_has_no_end_told_twice() -> None:
+    story, another = Story(), status(7).model_copy(update={"boot": "b0"})
+    done = status(9, finished=True)
+    said = (done, another, done, status(8), done)
+    assert [line for message in said for line in story.status(message)] == [
+        "a has finished: 9 scans, 9 placed"
+    ]
+
+
 def test_a_version_of_the_joint_map_is_told_once_with_its_components(
     random_joint: MakeJoint,
 ) -> None:
