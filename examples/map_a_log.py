@@ -8,6 +8,8 @@ import sys
 
 import mapweave
 
+if len(sys.argv) != 4:
+    raise SystemExit("usage: python map_a_log.py LOG MAP.json ROBOT")
 log, output, robot = sys.argv[1:]
 mapper = mapweave.Mapper(robot)
 for scan in mapweave.read_scans(log):

@@ -34,6 +34,8 @@ def tell(joint: JointMap) -> None:
 
 
 if __name__ == "__main__":  # the agent starts processes of its own, which load this file, too
+    if len(sys.argv) < 3:
+        raise SystemExit("usage: python own_driver.py ROBOT TEAM [ENDPOINT]")
     robot, team, *endpoints = sys.argv[1:]
     with mapweave_agent.Agent(robot, team, connect=endpoints or None, on_joint_map=tell) as agent:
         for stamp, ranges in sweeps():

@@ -8,6 +8,8 @@ import sys
 
 import mapweave_protocol
 
+if len(sys.argv) < 2:
+    raise SystemExit("usage: python subscribe.py TEAM [ENDPOINT]")
 team, *endpoints = sys.argv[1:]
 try:
     for joint in mapweave_protocol.joint_maps(team, connect=endpoints or None):

@@ -8,6 +8,7 @@ from mapweave.errors import FileError
 from mapweave.io.scan_range import ScanRange
 from mapweave.io.sources import ScanSource
 from mapweave.scan.scan import Scan
+from mapweave.text import counted
 
 NOMINAL_PERIOD = 0.2  # [s] between scans where the stamps do not tell; lidars turn at 5 Hz and more
 LONGEST_PAUSE = (
@@ -59,7 +60,7 @@ def count_selected(name: str, source: ScanSource, selected: ScanRange) -> int | 
     scans = sum(1 for _ in source.scans())
     total = selected.count(scans)
     if total == 0:
-        raise FileError(name, f"has {scans} scans, none of them in {selected}")
+        raise FileError(name, f"has {counted(scans, 'scan')}, none of them in {selected}")
     return total
 
 

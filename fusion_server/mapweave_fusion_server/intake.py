@@ -118,7 +118,7 @@ class Intake:
                 runs=len(state.claimants.boots),
                 status=state.status,
                 heard=self._last_heard.get(robot),
-                map_version=self._held_version(robot),
+                map_version=self._version_of_run(robot, state.status),
             )
             for robot, state in self._story.robots.items()
         )
@@ -203,6 +203,12 @@ class Intake:
     def _held_version(self, robot: str) -> int | None:
         held = self._coordinator.map_of(robot)
         return None if held is None else held.version
+
+    def _version_of_run(self, robot: str, status: StatusMessage | None) -> int | None:
+        """Return which map is here of the run that said `status`; of the last one if none did."""
+        if status is None:
+            return self._held_version(robot)
+        return self._coordinator.version_of(robot, status.boot)
 
     def robots_to_ask(self, now: float) -> tuple[list[str], list[str]]:
         """Return whom to ask for what has not arrived, by what they have said.

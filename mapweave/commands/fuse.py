@@ -50,6 +50,8 @@ def _run(options: argparse.Namespace) -> int:
         plot(joint, options.plot, {m.robot: m for m in given if isinstance(m, RobotMap)})
     for line in [json.dumps(_content(joint))] if options.json else tell(joint):
         print(line)  # noqa: T201
+    if not (options.output or options.plot or options.json):
+        print("The joint map is not kept: --output JOINT.json keeps it.")  # noqa: T201
     robots = set().union(*(_robots(some) for some in given))
     return 0 if _all_joined(joint, robots) else EXIT_NOT_ALL_JOINED
 

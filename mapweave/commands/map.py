@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,10 +89,12 @@ def _run(options: argparse.Namespace) -> int:
     source = open_source(options.log, _read_options(options, config))
     mapper = _mapper(options.robot, start, config)
     robot_map, taken = _map_all(options, source, mapper)
+    if not taken:
+        raise FileError(_name(options), _nothing_chosen(source, options.scans))
     _check_placed(options, _new(robot_map, start), taken)
     _write(options, robot_map)
     figures = _figures(_new(robot_map, start), taken)
-    print(json.dumps(figures) if options.json else _sentence(figures))  # noqa: T201
+    _tell(options, figures, _sentence(figures))
     return 0
 
 
@@ -115,9 +118,14 @@ def _run_grid(options: argparse.Namespace, config: Config) -> int:
     _write(options, robot_map)
     lines = robot_map.submaps[0].map
     figures = {"polylines": len(lines.polylines), "segments": len(lines.segments)}
-    sentence = "{polylines} polylines, {segments} segments".format(**figures)
-    print(json.dumps(figures) if options.json else sentence)  # noqa: T201
+    _tell(options, figures, "{polylines} polylines, {segments} segments".format(**figures))
     return 0
+
+
+def _tell(options: argparse.Namespace, figures: Mapping[str, float], sentence: str) -> None:
+    print(json.dumps(figures) if options.json else sentence)  # noqa: T201
+    if not (options.output or options.plot or options.json):
+        print("The map is not kept: --output MAP.json keeps it.")  # noqa: T201
 
 
 def _write(options: argparse.Namespace, robot_map: RobotMap) -> None:
@@ -163,18 +171,28 @@ def _new(robot_map: RobotMap, start: Start) -> RobotMap:
 def _check_placed(options: argparse.Namespace, new: RobotMap, taken: int) -> None:
     if new.submaps:
         return
-    name = "standard input" if options.log == STANDARD_INPUT else options.log
     if options.localize is not None:
         raise FileError(
-            name,
+            _name(options),
             f"none of its {taken} chosen scans can be found in {options.localize}; expected some"
             " metres of a drive in a place that it shows",
         )
     raise FileError(
-        name,
+        _name(options),
         f"none of its {taken} chosen scans can be mapped; expected scans whose"
-        " returns are dense enough to show walls, and a range of scans that it has",
+        " returns are dense enough to show walls",
     )
+
+
+def _name(options: argparse.Namespace) -> str:
+    return "standard input" if options.log == STANDARD_INPUT else str(options.log)
+
+
+def _nothing_chosen(source: ScanSource, chosen: ScanRange) -> str:
+    count = source.count()
+    if count is None:
+        return f"ended before scan {chosen.first} came"
+    return f"has {counted(count, 'scan')}, none of them in {chosen}"
 
 
 def _warn(message: str) -> None:

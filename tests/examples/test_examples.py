@@ -35,6 +35,23 @@ def run(name: str, *arguments: str | Path, folder: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("compare_two_maps.py", "A.json B.json"),
+        ("map_a_log.py", "LOG MAP.json ROBOT"),
+        ("own_driver.py", "ROBOT TEAM [ENDPOINT]"),
+        ("subscribe.py", "TEAM [ENDPOINT]"),
+    ],
+)
+def test_an_example_without_arguments_says_which_it_takes(name: str, words: str) -> None:
+    done = subprocess.run(
+        [sys.executable, EXAMPLES / name], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (1, f"usage: python {name} {words}\n")
+    assert f"python {name} {words}``" in (EXAMPLES / name).read_text(encoding="utf-8")
+
+
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Return two overlapping stretches of the log of a robot in the arena."""

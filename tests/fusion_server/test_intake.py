@@ -1,6 +1,7 @@
 """What leaves the intake whatever arrives: nothing."""
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,3 +81,20 @@ def test_a_robot_whose_map_has_not_come_is_asked_for_it(
         intake.take(status, 0.0)
         assert intake.robots_to_ask(ASKED_AFTER) == (asked, [])
         assert intake.robots_to_ask(10 * ASKED_AFTER) == ([], [])  # nothing was heard since
+
+
+def test_a_robot_is_reported_with_the_map_of_the_run_that_said_its_status(tmp_path: Path) -> None:
+    submap = Submap(0, 0, np.zeros(3), LineMap.empty(), Trajectory.empty())
+    with Store(tmp_path / "store.sqlite", "t") as store:
+        intake = Intake(Coordinator(CoordinatorParameters()), store, Story())
+        for boot, version, number in [("first", 283, 0), ("second", 68, 1)]:
+            held = RobotMap("a", boot, version, (replace(submap, component=number),))
+            intake.take(Arrival(MAP.build(team="t", robot="a"), MapSender().payload(held)), 0.0)
+        for boot, version in [("first", 283), ("second", 68), ("first", 283)]:
+            intake.take(_status(version, boot), 0.0)
+            [report] = intake.reports
+            assert report.status is not None
+            assert (report.status.boot, report.map_version) == (boot, version)
+        intake.take(_status(1, "third"), 0.0)
+        [report] = intake.reports
+        assert report.map_version is None

@@ -24,11 +24,12 @@ class RobotReport:
     runs
         How many runs of it are alive: one, where nothing is wrong; none when it is gone.
     status
-        What it said last of itself.
+        What it said last of itself; of several runs, the one that was heard last.
     heard
         When it was heard last [s since 1970]; None if not since the coordinator began.
     map_version
-        Which version of its map is here; None if none is.
+        Which version of the map of that run is here; None if none is. Of the last run, where none
+        was heard.
     """
 
     robot: str

@@ -37,6 +37,7 @@ def _robot(report: RobotReport) -> dict[str, Any]:
 
 def _status(status: StatusMessage) -> dict[str, Any]:
     return {
+        "boot": status.boot,
         "state": status.state,
         "scans_seen": status.scans_seen,
         "scans_placed": status.scans_placed,

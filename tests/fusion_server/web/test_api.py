@@ -114,6 +114,7 @@ def test_robots_are_told_as_they_were_reported(
     a, silent = told["robots"]
     assert (a["robot"], a["alive"], a["heard"], a["map_version"]) == ("a", True, 99.0, 4)
     assert (a["status"]["scans_placed"], a["status"]["map_version"]) == (8, 5)
+    assert a["status"]["boot"] == "first"
     assert (silent["robot"], silent["alive"], silent["status"]) == ("silent", False, None)
     assert told["coordinator"]["stamp"] == 100.0
 

@@ -14,14 +14,16 @@ from playwright.sync_api import Page as Tab
 
 from mapweave.config import Config
 from mapweave.evidence import Evidence
-from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap
+from mapweave.maps import Alignment, JointComponent, JointMap, LineMap, RobotMap
 from mapweave.marks import PlacedMark
 from mapweave.orders import Order, OrderKind
+from mapweave.reasons import Reason
 from mapweave_fusion_server import journal
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import HttpAddress
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed, RobotReport
 from mapweave_fusion_server.web.server import live_page
+from mapweave_protocol.wire.messages import StatusMessage
 from tests.fusion_server.web.browser import Visit, chromium, visit
 from tests.fusion_server.web.conftest import TOKEN, Page, make_joint, make_pose
 
@@ -532,3 +534,55 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(
     with visit(browser, page.address.url(), phone=True) as seen:
         expect_version(seen.tab, 1)
         assert seen.tab.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def told_of(robot: str, **also: int) -> StatusMessage:
+    counts = {"scans_seen": 14640, "scans_placed": 13255, "scans_total": 14640, **also}
+    fields = {"boot": "b", "stamp": 0.0, "state": "mapping", "components": 3, "submaps": 128}
+    traffic = {"map": {"messages": 283, "bytes": 987_000}}
+    return StatusMessage.model_validate(
+        {"robot": robot, "map_version": 283, "sent": traffic, **counts, **fields}
+    )
+
+
+@pytest.mark.parametrize("ago", [1.0, 21.0, 5300.0])
+def test_all_of_the_team_is_within_its_panel_however_much_there_is_to_say(
+    ago: float, page: Page, seen: Visit
+) -> None:
+    seen.tab.set_viewport_size({"width": 1400, "height": 900})
+    robots = tuple(
+        RobotReport(robot, 2, told_of(robot), 1000.0 - ago, 68) for robot in ("r1", "r" * 32)
+    )
+    page.feed.show_team(robots, CoordinatorReport(stamp=1000.0))
+    behind = seen.tab.locator("#team small", has_text="215 behind here").first
+    expect(behind).to_be_visible()
+    assert seen.tab.evaluate("""() => {
+      const panel = document.querySelector(".panel");
+      return panel.scrollWidth <= panel.clientWidth;
+    }""")
+    box = behind.bounding_box()
+    assert box is not None
+    assert box["height"] < 25, "one line"
+
+
+def refused(reference: str, other: str, common: float) -> Alignment:
+    reason = Reason.words(f"only {common} m of wall in common")
+    evidence = Evidence(common=common, contradicted=0.0, overlap=1.0, score=common)
+    sure = 0.02 / (1.0 + common)  # of what is refused, no measure of how close it is
+    return Alignment(
+        *(f"{reference}/0", f"{other}/0", np.zeros(3), "refused", sure, reason), evidence=evidence
+    )
+
+
+def test_of_what_is_refused_the_closest_has_most_in_common(
+    page: Page, seen: Visit, lines: LineMap
+) -> None:
+    joint = apart(1, lines, "a", "b", "c")
+    found = (refused("a", "b", 0.5), refused("a", "c", 1.4), refused("b", "c", 0.9))
+    page.publish(replace(joint, alignments=found))
+    sure = seen.tab.locator("#sure li").first
+    expect(sure).to_contain_text("a/0 – c/0: only 1.4 m of wall in common")
+    expect(sure).not_to_contain_text("%")
+    expect(seen.tab.locator("#decisions li").first).to_contain_text(
+        "coincides where both looked100%"
+    )

@@ -24,6 +24,7 @@ from mapweave.cli import main
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import read_joint, read_map, write_map
+from mapweave.io.readers import count_scans
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import (
@@ -280,9 +281,22 @@ def test_a_missing_log_and_a_folder_fail_in_one_line(tmp_path: Path) -> None:
     assert_fails_in_one_line(main_here("map", tmp_path), tmp_path, "is a folder", "expected")
 
 
-def test_scans_beyond_the_logs_end_fail_in_one_line(log: Path) -> None:
+def test_scans_beyond_the_logs_end_fail_in_one_line_that_says_how_many_there_are(
+    log: Path,
+) -> None:
     done = main_here("map", log, "--scans", "50:60")
-    assert_fails_in_one_line(done, log, "none of its 0 chosen scans")
+    assert_fails_in_one_line(done, log, f"has {count_scans(log)} scans, none of them in 50:60")
+
+
+def test_a_map_that_nobody_asked_to_keep_is_said_to_be_lost(log: Path, tmp_path: Path) -> None:
+    told = "The map is not kept: --output MAP.json keeps it."
+    assert main_here("map", log).stdout.splitlines()[1:] == [told]
+    for words in (
+        ["--output", tmp_path / "map.json"],
+        ["--plot", tmp_path / "map.png"],
+        ["--json"],
+    ):
+        assert told not in main_here("map", log, *words).stdout
 
 
 def test_a_robot_id_that_is_none_is_refused_before_any_work(log: Path) -> None:
@@ -366,6 +380,15 @@ def test_what_was_joined_is_told_as_json_to_a_program(maps: dict[str, Path]) -> 
     assert (alignment["reference"], alignment["other"]) == ("a/0", "b/0")
     assert alignment["decision"] == "accepted" and len(alignment["transform"]) == 3
     assert list(component["robots"]) == ["a/0", "b/0"] and component["segments"] > 0
+
+
+def test_a_joint_map_that_nobody_asked_to_keep_is_said_to_be_lost(
+    maps: dict[str, Path], tmp_path: Path
+) -> None:
+    told = "The joint map is not kept: --output JOINT.json keeps it."
+    assert main_here("fuse", maps["a"], maps["b"]).stdout.splitlines()[-1] == told
+    for words in (["--output", tmp_path / "joint.json"], ["--json"]):
+        assert told not in main_here("fuse", maps["a"], maps["b"], *words).stdout
 
 
 def test_maps_that_cannot_all_be_joined_give_status_3_and_the_rest_of_the_work(

@@ -12,7 +12,7 @@ const KINDS = {
   accepted: { label: "accepted", mark: "✓", look: "good", rank: 4 },
   refused: { label: "refused", mark: "✕", look: "", rank: 5 },
 };
-const BEYOND = ["overlap", "held across the walls", "maps go on for", "parts that agree"]; // what the sentence does not say
+const BEYOND = ["coincides where both looked", "held across the walls", "maps go on for", "parts that agree"]; // what the sentence does not say
 const WAIT = 250; // [ms] a pointer rests on a decision before its evidence is shown
 
 /** Return what became of an alignment. */
@@ -108,7 +108,7 @@ export function numbersOf({ evidence, runner_up: rival }, named = null) {
   const rows = [
     ["in common", evidence.common, metres],
     ["contradicted", evidence.contradicted, metres],
-    ["overlap", evidence.overlap, percentOf],
+    ["coincides where both looked", evidence.overlap, percentOf],
     ["held across the walls", evidence.held, metres],
     ["maps go on for", evidence.reach, metres],
     ["parts that agree", evidence.parts, String],

@@ -20,16 +20,21 @@ function notJoined(joint, scenes, show) {
   const between = joint.alignments
     .map((alignment, index) => ({ alignment, index }))
     .filter(({ alignment }) => whose(alignment.reference) !== whose(alignment.other) && alignment.decision !== "accepted")
-    .sort((a, b) => rank(b.alignment) - rank(a.alignment));
+    .sort((a, b) => rank(b.alignment) - rank(a.alignment) || fit(b.alignment) - fit(a.alignment));
   const best = between[0];
   return element("li", { class: "doubt" },
     element("strong", {}, `How ${groups.join(" and ")} lie to each other is not known`),
     ...(best
-      ? ["The closest: ", chipOf(best.alignment), " ", endsOf(best.alignment), ` ${percent(best.alignment.confidence)}: ${best.alignment.reason}`, more(joint, best.index, show)]
+      ? ["The closest: ", chipOf(best.alignment), " ", endsOf(best.alignment), `${sureness(best.alignment)}: ${best.alignment.reason}`, more(joint, best.index, show)]
       : ["Nothing was found between them yet."]));
 }
 
-const rank = (alignment) => (alignment.decision === "ambiguous" ? 1 : 0) + alignment.confidence;
+/** What is ambiguous is closer than what is refused, of which no confidence is told. */
+const rank = ({ decision, confidence }) => (decision === "ambiguous" ? 1 + confidence : 0);
+
+/** Return how much more speaks for an alignment than against it [m]. */
+const fit = ({ evidence: { score, common = 0, contradicted = 0 } }) => score ?? common - contradicted;
+const sureness = ({ decision, confidence }) => (decision === "refused" ? "" : ` ${percent(confidence)}`);
 
 /** Return the join that the version rests on and that is least sure. */
 function weakest(joint, show) {

@@ -7,7 +7,7 @@ import { colourOf } from "./palette.js";
 /** Fill `target` with a row a robot; `on.follow` takes the robot to be followed, or null. */
 export function fillTeam(target, report, following, on) {
   const now = report.coordinator.stamp;
-  const head = element("tr", {}, ...["Robot", "State", "Scans", "Sent", "Heard"].map((title, k) =>
+  const head = element("tr", {}, ...["Robot", "State", "Scans"].map((title, k) =>
     element("th", { scope: "col", class: k > 1 ? "number" : "" }, title)));
   const robots = [...report.robots].sort((a, b) => byName(a.robot, b.robot));
   const rows = robots.map((robot) => rowOf(robot, now, following === robot.robot, on));
@@ -31,20 +31,19 @@ function rowOf(robot, now, followed, on) {
     onclick: () => on.follow(followed ? null : robot.robot), // a cell of another state is another one
   }, "follow");
   return element("tr", {},
-    element("th", { scope: "row" }, element("span", { class: "name" }, swatch, robot.robot), " ", follow),
-    element("td", {}, ...stateOf(robot)),
-    element("td", { class: "number" }, ...scansOf(status)),
-    element("td", { class: "number" }, status ? amount(sentBy(status)) : "–"),
-    element("td", { class: "number" }, robot.heard === null ? "–" : heardAgo(now - robot.heard)));
+    element("th", { scope: "row" }, element("span", { class: "name" }, swatch, robot.robot), follow),
+    element("td", {}, ...stateOf(robot, now)),
+    element("td", { class: "number" }, ...scansOf(status)));
 }
 
-function stateOf({ alive, runs, status, map_version: held }) {
+function stateOf({ alive, runs, status, heard, map_version: held }, now) {
   const lines = [element("span", { class: alive ? "here" : "gone" }, alive ? "● here" : "○ gone")];
+  if (heard !== null) lines.push(element("small", {}, `heard ${heardAgo(now - heard)}`));
   if (runs > 1) lines.push(element("small", { class: "gone" }, `${runs} agents under one name`));
   if (status) {
     const parts = status.components > 1 ? `, in ${counted(status.components, "component")}` : "";
     lines.push(element("small", {}, `${status.state}, ${counted(status.submaps, "submap")}${parts}`));
-    const behind = held === null ? 0 : status.map_version - held;
+    const behind = status.submaps ? status.map_version - (held ?? 0) : 0;
     if (behind > 0) lines.push(element("small", {}, `${behind} behind here`));
     if (status.compared.length) lines.push(element("small", {}, `compares ${status.compared.join(", ")}`));
   }
@@ -55,7 +54,8 @@ function scansOf(status) {
   if (!status) return ["–"];
   const { scans_placed: placed, scans_seen: seen, scans_total: total } = status;
   const bar = total ? element("progress", { max: total, value: seen, "aria-label": `scans seen of ${total}` }) : null;
-  return [`${placed}${total ? `/${total}` : ""}`, bar, placed < seen ? element("small", {}, `${seen - placed} not placed`) : null].filter(Boolean);
+  return [`${placed}${total ? `/${total}` : ""}`, bar, placed < seen ? element("small", {}, `${seen - placed} not placed`) : null,
+    element("small", {}, `${amount(sentBy(status))} sent`)].filter(Boolean);
 }
 
 const sentBy = (status) => Object.values(status.sent).reduce((sum, { bytes }) => sum + bytes, 0);
