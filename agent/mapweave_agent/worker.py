@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any, Self
@@ -52,6 +53,8 @@ class Worker:
             target=self._serve, args=(theirs, self._argument), daemon=True
         )
         # Ctrl-C goes to the whole group; one that is just being born would leave a trace of it.
+        # The tracker first: where Python 3.11 starts it with the process, it unblocks the signal.
+        resource_tracker.ensure_running()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         self._process.start()
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

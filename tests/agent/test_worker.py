@@ -80,5 +80,5 @@ def test_ctrl_c_while_a_worker_is_being_started_leaves_no_trace_of_it(
     time.sleep(after)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=PATIENCE)
-    assert said.count("Traceback") <= 1, "the script's own"
+    assert said.count("Traceback") <= 1, said
     assert "spawn_main" not in said
