@@ -24,6 +24,7 @@ from mapweave_protocol.wire.orders.runs_message import WireRun
 from mapweave_protocol.wire.queries import JointQuery
 
 ANSWER_WITHIN = 5.0  # [s]
+TIMED_OUT = b"Timeout"  # what Zenoh itself says for one who was asked and has said nothing
 ALL_ORDERS = JointQuery(orders="all").parameters
 ITS_STATUS = JointQuery(of="status").parameters
 
@@ -59,7 +60,8 @@ def ask_latest(
     selector, each = JOINT_QUERY.build(team=team), zenoh.ConsolidationMode.NONE
     replies = list(session.get(selector, consolidation=each, timeout=timeout))
     maps = [decode(JointMapMessage, reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
-    return max(maps, key=lambda message: message.version, default=None), bool(replies)
+    said = any(r.err is None or r.err.payload.to_bytes() != TIMED_OUT for r in replies)
+    return max(maps, key=lambda message: message.version, default=None), said
 
 
 def ask_robot_map(

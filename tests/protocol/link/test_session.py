@@ -15,7 +15,7 @@ import mapweave_protocol
 from mapweave.errors import ArgumentError, InvalidIdError
 from mapweave.maps import JointMap, RobotMap
 from mapweave_protocol.errors import EndpointError, UnreachableError
-from mapweave_protocol.link.asking import ask_joint_maps, ask_robot_map
+from mapweave_protocol.link.asking import ask_joint_maps, ask_latest, ask_robot_map
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Inbox, map_reader, read_presence
 from mapweave_protocol.link.session import (
@@ -308,3 +308,15 @@ def test_the_environment_names_the_router(monkeypatch: pytest.MonkeyPatch) -> No
     assert default_endpoints() == ("tcp/one:1", "tcp/two:2")
     monkeypatch.delenv("MAPWEAVE_CONNECT")
     assert default_endpoints() == ("tcp/localhost:7447",)
+
+
+def test_a_coordinator_that_stands_still_has_not_answered(endpoint: str, team: str) -> None:
+    # It may have joint maps: who took it for one that has none would count from 1.
+    asked: list[zenoh.Query] = []
+    key = keys.JOINT_QUERY.build(team=team)
+    with (
+        open_session([endpoint]) as coordinator,
+        open_session([endpoint]) as session,
+        coordinator.declare_queryable(key, asked.append),
+    ):
+        wait_for(lambda: ask_latest(session, team, 0.2) == (None, False) and bool(asked))
