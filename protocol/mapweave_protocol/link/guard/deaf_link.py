@@ -51,7 +51,8 @@ def mending_deaf_links(
             for pause in looked_at_after:
                 if ended.wait(pause):
                     return
-                if not any(answers(session) for _ in range(TRIES)):
+                # A session that is being closed is asked nothing more: it would raise.
+                if not any(ended.is_set() or answers(session) for _ in range(TRIES)):
                     _log.warning("nothing comes on the link that was opened again: opened anew")
                     cut_links(session)
                     break
