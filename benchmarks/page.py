@@ -124,6 +124,7 @@ def _opened(joint: JointMap, maps: tuple[RobotMap, ...]) -> Iterator[Bench]:
         seen.tab.add_init_script(WATCH)
         seen.tab.goto(address.url())
         bench.painted(1)
+        gc.freeze()  # as the coordinator does
         yield bench
 
 

@@ -1,6 +1,7 @@
 """``mapweave server``: the coordinator of a team."""
 
 import argparse
+import gc
 import logging
 import math
 import os
@@ -109,6 +110,7 @@ def _run(options: argparse.Namespace) -> int:
         open_session(endpoints, on_wait=partial(tell_waiting, _log), link=link) as session,
         nullcontext() if feed is None else feed.positions.heard_on(session, team),
     ):
+        gc.freeze()  # what was loaded stays: collections, in which all waits, need not look at it
         Service(session, team, store, parameters, config, feed).run(stop_on_signal())
     return 0
 

@@ -38,7 +38,7 @@ from mapweave.scan.coverage import coverage
 from mapweave.text import in_words
 
 _EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
-_METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
+METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
 """Decimals that are written of each kind of number."""
 
 _File = TypeVar("_File", HeaderFile, MapFile, JointFile)
@@ -149,7 +149,7 @@ def joint_content(joint: JointMap, *, searched: bool = True) -> dict[str, Any]:
 
     What was searched takes longer to work out than all the rest.
     """
-    components = [_component(component, searched=searched) for component in joint.components]
+    components = [component_content(component, searched=searched) for component in joint.components]
     return {
         "format": JOINT_FORMAT,
         "version": joint.version,
@@ -231,7 +231,7 @@ def _uncertainty(trajectory: Trajectory) -> dict[str, object]:
     """Return the rows beside those of the trajectory, where they are known."""
     if trajectory.uncertainty is None:
         return {}
-    return {"uncertainty": np.round(trajectory.uncertainty, _METRES).tolist()}
+    return {"uncertainty": np.round(trajectory.uncertainty, METRES).tolist()}
 
 
 def _line_map(lines: LineMap) -> dict[str, object]:
@@ -304,12 +304,13 @@ def coverage_content(lines: LineMap) -> dict[str, Any]:
     found = coverage(lines)
     return {
         "explored_m2": round(found.explored, 1),
-        "frontiers": [np.round(line, _METRES).tolist() for line in found.frontiers],
+        "frontiers": [np.round(line, METRES).tolist() for line in found.frontiers],
     }
 
 
-def _component(component: JointComponent, *, searched: bool) -> dict[str, object]:
-    confidences = np.round(component.segment_confidence, _METRES).tolist()
+def component_content(component: JointComponent, *, searched: bool = True) -> dict[str, Any]:
+    """Return one of the ``components`` of a joint map's file; `searched` as in `joint_content`."""
+    confidences = np.round(component.segment_confidence, METRES).tolist()
     return {
         "robots": {name: _pose(pose) for name, pose in component.robots.items()},
         "confidence": _number(component.confidence, _RATIOS),
@@ -322,11 +323,11 @@ def _component(component: JointComponent, *, searched: bool) -> dict[str, object
 
 def _pose(pose: ArrayLike) -> list[float]:
     x, y, theta = np.asarray(pose, dtype=float).tolist()
-    return [round(x, _METRES), round(y, _METRES), round(theta, _RADIANS)]
+    return [round(x, METRES), round(y, METRES), round(theta, _RADIANS)]
 
 
 def _metres(points: FloatArray) -> list[list[float]]:
-    rounded: list[list[float]] = np.round(points, _METRES).tolist()
+    rounded: list[list[float]] = np.round(points, METRES).tolist()
     return rounded
 
 

@@ -9,6 +9,7 @@ from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.versions.changes import changes_between
 from mapweave_fusion_server.web.versions.json_text import to_json
 from mapweave_fusion_server.web.versions.recent import Recent
+from mapweave_fusion_server.web.versions.told import ToldVersion
 from mapweave_protocol.wire.codec import decode
 from mapweave_protocol.wire.messages import JointMapMessage
 
@@ -29,7 +30,7 @@ class History:
     def __init__(self, store: Store) -> None:
         self._store = store
         self._joints: Recent[JointMap] = Recent(self._decoded, KEPT)
-        self._lines: Recent[dict[str, Any]] = Recent(self._without_coverage, KEPT)
+        self._told: Recent[ToldVersion] = Recent(self._as_told, KEPT)
         self._coverage: Recent[list[dict[str, Any]]] = Recent(self._searched, KEPT)
         self._texts: Recent[bytes] = Recent(self._encoded, KEPT)
         self._changes: Recent[bytes] = Recent(self._changed, KEPT)
@@ -74,9 +75,9 @@ class History:
         payload = self._store.version(number)
         return None if payload is None else decode(JointMapMessage, payload).unpack()
 
-    def _without_coverage(self, number: int) -> dict[str, Any] | None:
+    def _as_told(self, number: int) -> ToldVersion | None:
         joint = self.joint(number)
-        return None if joint is None else joint_content(joint, searched=False)
+        return None if joint is None else ToldVersion.of(joint)
 
     def _searched(self, number: int) -> list[dict[str, Any]] | None:
         joint = self.joint(number)
@@ -85,12 +86,13 @@ class History:
         return [coverage_content(component.map) for component in joint.components]
 
     def _encoded(self, number: int) -> bytes | None:
-        content, searched = self._lines.get(number), self._coverage.get(number)
-        if content is None or searched is None:
+        joint, searched = self.joint(number), self._coverage.get(number)
+        if joint is None or searched is None:
             return None
+        content = joint_content(joint, searched=False)
         components = zip(content["components"], searched, strict=True)
         return to_json({**content, "components": [{**one, **how} for one, how in components]})
 
     def _changed(self, number: int) -> bytes | None:
-        before, after = self._lines.get(number - 1), self._lines.get(number)
+        before, after = self._told.get(number - 1), self._told.get(number)
         return None if before is None or after is None else to_json(changes_between(before, after))

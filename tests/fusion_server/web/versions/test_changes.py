@@ -11,8 +11,9 @@ import pytest
 from mapweave.io.map_files import joint_content
 from mapweave.maps import Alignment, JointComponent, JointMap, LineMap
 from mapweave.reasons import Reason
-from mapweave_fusion_server.web.versions.changes import WALLS, changes_between
+from mapweave_fusion_server.web.versions.changes import changes_between
 from mapweave_fusion_server.web.versions.json_text import to_json
+from mapweave_fusion_server.web.versions.told import WALLS, ToldVersion
 
 ROOM = 4.0  # [m]
 
@@ -39,6 +40,10 @@ def alignment(reference: str, other: str, confidence: float = 0.9) -> Alignment:
 
 def version(*components: JointComponent, alignments: Sequence[Alignment] = ()) -> JointMap:
     return JointMap(1, components, tuple(alignments))
+
+
+def changes_of(before: JointMap, after: JointMap) -> dict[str, Any]:
+    return changes_between(ToldVersion.of(before), ToldVersion.of(after))
 
 
 def content_of(joint: JointMap) -> dict[str, Any]:
@@ -98,14 +103,14 @@ OTHER = [alignment("a/0", "b/0"), alignment("a/0", "c/0"), alignment("b/0", "c/0
 def test_a_version_is_made_of_the_one_before_it_and_what_changed(
     before: JointMap, after: JointMap
 ) -> None:
-    changes = json.loads(to_json(changes_between(content_of(before), content_of(after))))
+    changes = json.loads(to_json(changes_of(before, after)))
     made = made_of(content_of(before), changes)
     whole = json.loads(to_json(content_of(after)))
     assert made == {name: whole[name] for name in ("components", "alignments")}
 
 
 def test_what_stayed_is_not_sent() -> None:
-    nothing = changes_between(content_of(ONE), content_of(ONE))
+    nothing = changes_of(ONE, ONE)
     assert nothing["components"][0]["walls"] == [[0, 50]]
     assert nothing["components"][0]["free_space"] == [[0, 50]]
     assert nothing["alignments"] == [[0, 1]]
@@ -115,9 +120,7 @@ def test_of_one_room_that_changed_only_that_is_sent() -> None:
     segments = MAP.segments.copy()
     segments[4 * 20 : 4 * 21] += 0.01
     moved = replace(MAP, segments=segments)
-    (change,) = changes_between(
-        content_of(ONE), content_of(version(component(moved, "a/0", "b/0")))
-    )["components"]
+    (change,) = changes_of(ONE, version(component(moved, "a/0", "b/0")))["components"]
     first, new, last = change["walls"]
     assert (first, last) == ([0, 20], [21, 50])
     assert [len(new[name]) for name in WALLS] == [1, 1, 1]
@@ -126,6 +129,6 @@ def test_of_one_room_that_changed_only_that_is_sent() -> None:
 
 def test_a_wall_that_is_less_sure_than_before_is_sent() -> None:
     doubted = version(component(MAP, "a/0", "b/0", sure=0.5))
-    (change,) = changes_between(content_of(ONE), content_of(doubted))["components"]
+    (change,) = changes_of(ONE, doubted)["components"]
     (piece,) = change["walls"]
     assert len(piece["segment_confidence"]) == 50
