@@ -12,7 +12,7 @@ SOURCES := pyproject.toml README.md LICENSE \
 TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
 
 .PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
-.PHONY: bench-speed bench-faults bench-live bench-robots bench-shape
+.PHONY: bench-speed bench-faults bench-live bench-page bench-robots bench-shape
 .PHONY: clean distclean mutations
 
 $(STAMP): pyproject.toml
@@ -103,6 +103,9 @@ bench-map: $(KERNELS)
 
 bench-live: $(KERNELS)
 	$(BIN)/python -m benchmarks live --seconds 600
+
+bench-page: $(KERNELS)
+	$(BIN)/python -m benchmarks page
 
 bench-speed: $(KERNELS)
 	$(BIN)/python -m benchmarks speed
