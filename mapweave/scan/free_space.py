@@ -218,12 +218,12 @@ def _polygons(geometry: BaseGeometry) -> list[Polygon]:
 
 
 def _without_holes(polygon: Polygon) -> list[Polygon]:
-    """Cut `polygon` through its first hole until no piece has one."""
+    """Cut `polygon` through its holes, the middle one first, until no piece has one."""
     if not polygon.interiors:
         return [polygon]
     left, bottom, right, top = polygon.bounds
-    hole_left, _, hole_right, _ = polygon.interiors[0].bounds
-    middle = (hole_left + hole_right) / 2
+    middles = sorted((hole.bounds[0] + hole.bounds[2]) / 2 for hole in polygon.interiors)
+    middle = middles[len(middles) // 2]
     # Not clip_by_rect, which is faster: it leaves pieces that touch themselves.
     halves = (box(left, bottom, middle, top), box(middle, bottom, right, top))
     cut = [part for half in halves for part in _polygons(shapely.intersection(polygon, half))]
