@@ -105,6 +105,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "SelectionParameters": {"tolerance": 0.09},
     "SimplificationParameters": {"spacing": 0.1},
     "SliverParameters": {"max_distance": 0.15},
+    "StandingThingsParameters": {"near": 0.15, "clearance": 0.3, "sight": 12.0},
     "StraighteningParameters": {"max_bend": 0.04, "max_crossing": 0.1},
     "SubmapParameters": {
         "length": 12.0,

@@ -218,14 +218,14 @@ def unsettled(
         What a return at a new place counts there.
     """
     p = parameters
-    if best.surprise <= p.remarkable or not _is_open(best, p):
+    if best.surprise <= p.remarkable or not is_open(best, p):
         return 0.0
     least = best.value(novelty) - p.lead
     alike = [t for t in _rivals(best, found, p) if t.value(novelty) > least]
     return max((_apart(best, t) for t in alike if _is_slid(best, t, p)), default=0.0)
 
 
-def _is_open(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
+def is_open(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
     """Whether its walls leave a direction open."""
     held = ellipse(tracked.information)
     return held.least <= p.open_direction * held.most
@@ -233,7 +233,7 @@ def _is_open(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
 
 def _is_slid(best: ScanMatch, other: ScanMatch, p: AcceptanceParameters) -> bool:
     """Whether `other` is `best`, but for how far along an open direction it is."""
-    if not _is_open(best, p) or abs(se2.wrap(other.pose[2] - best.pose[2])) > p.rival_turn:
+    if not is_open(best, p) or abs(se2.wrap(other.pose[2] - best.pose[2])) > p.rival_turn:
         return False
     across = np.linalg.eigh(best.information[:2, :2])[1][:, 1]
     return bool(abs(across @ (other.pose - best.pose)[:2]) <= p.rival_distance)

@@ -18,10 +18,11 @@ from mapweave.kernels.pose_evidence import (
     pose_evidence,
 )
 from mapweave.kernels.viewpoints import make_viewpoints
+from mapweave.mapping.tracking.standing_things import StandingThings, StandingThingsParameters
 from mapweave.matching.correlative import CorrelativeParameters, LikelihoodField, search
 from mapweave.matching.icp import CELL, IcpParameters, Target
 from mapweave.parameters import StageParameters, derived
-from mapweave.scan.points import OrientedPoints
+from mapweave.scan.points import OrientedPoints, join_points
 from mapweave.scan.scan import Scan
 from mapweave.scan.visibility import beam_spacing, clear_ranges
 
@@ -31,6 +32,7 @@ class LocalMapParameters(StageParameters):
 
     icp: IcpParameters = derived(IcpParameters.of)
     search: CorrelativeParameters = derived(CorrelativeParameters.of)
+    things: StandingThingsParameters = derived(StandingThingsParameters.of)
     keyframes: int = Field(60, ge=1, description="how many are remembered: some 15-20 m of path")
     keyframe_step: float = derived(
         lambda c: c.mapping.keyframe_step, gt=0, description="[m] of motion that makes a new one"
@@ -129,6 +131,7 @@ class LocalMap:
         self._known = make_point_map(p.icp.normal_weight, CELL, p.thin, p.keyframes)
         self._viewpoints = make_viewpoints(p.keyframes)
         self._settings = evidence_settings(_settings(p))
+        self._things = StandingThings(p.things)
         self._newest = -1
         self._last: FloatArray | None = None
         self._raster: LikelihoodField | None = None
@@ -138,6 +141,7 @@ class LocalMap:
         """Return one that remembers by itself from now on."""
         other = LocalMap(self._parameters)
         other._known, other._viewpoints = self._known.copy(), self._viewpoints.copy()
+        other._things = self._things.copy()
         other._last, other._raster, other._newest = self._last, self._raster, self._newest
         return other
 
@@ -156,22 +160,58 @@ class LocalMap:
         """What scans are aligned to; there is none while the map is empty."""
         return Target(self._known)
 
-    def remember(self, scan: Scan, oriented: OrientedPoints, pose: FloatArray) -> None:
+    @property
+    def distrusts_things(self) -> bool:
+        """Whether of things that may move only those are landmarks that stood for a while."""
+        return self._things.are_distrusted
+
+    def trust_things(self) -> None:
+        """Take things that may move for landmarks until they are known to move."""
+        self._things.are_distrusted = False
+
+    def remember(
+        self,
+        scan: Scan,
+        oriented: OrientedPoints,
+        loose: BoolArray,
+        pose: FloatArray,
+        *,
+        held: bool,
+    ) -> None:
         """Add a scan taken at `pose` (3,), unless it was taken about where the last one was.
 
         Parameters
         ----------
         oriented
             Its oriented points, sensor frame.
+        loose
+            (n,) which of them are on things that may move, and are not needed as landmarks.
+        held
+            Whether the pose is held in every direction: from elsewhere nobody knows what moved.
         """
         if not self._is_news(pose):
             return
-        placed = oriented.moved(pose)
+        placed = self._landmarks(scan, oriented.moved(pose), loose, pose, held=held)
         self._known.add(placed.points, placed.normals)
         _, numbers = self._known.find(placed.points, placed.normals, CELL)
         self._newest = max(self._newest, int(numbers.max(initial=-1)))
         self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
+
+    def _landmarks(
+        self, scan: Scan, placed: OrientedPoints, loose: BoolArray, pose: FloatArray, *, held: bool
+    ) -> OrientedPoints:
+        """Return what of a scan, `placed` where it was taken, is to be aligned to."""
+        standing: list[OrientedPoints] = []
+        distrusted = self.distrusts_things  # as the scan was placed by
+        if held:
+            things = placed.at(np.flatnonzero(loose))
+            standing = self._things.look(scan, pose, placed.points, things)
+        else:
+            self._things.forget()
+        if not distrusted:
+            return placed
+        return join_points([placed.at(np.flatnonzero(~loose)), *standing])
 
     def search(
         self, points: FloatArray, centre: FloatArray, max_turn: float, reach: float | None = None
@@ -204,6 +244,12 @@ class LocalMap:
         placed = [points.moved(pose) for pose in poses]
         numbers = [self._known.find(at.points, at.normals, reach)[1] for at in placed]
         return np.array([(each >= 0) & (each <= until) for each in numbers])
+
+    def lies_on(self, points: OrientedPoints, pose: FloatArray) -> BoolArray:
+        """(n,) which `points`, seen from `pose` (3,), lie on known surfaces."""
+        reach = self._parameters.overlap
+        explained = self._known.explains(points.points, points.normals, pose[None], reach)
+        return np.asarray(explained[0])
 
     def evidence(
         self, scan: Scan, oriented: OrientedPoints, loose: BoolArray, poses: FloatArray

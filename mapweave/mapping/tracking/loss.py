@@ -32,7 +32,7 @@ class Loss:
             self._other, self._blind, self._fitting = None, 0, 0
             return
         if self._other is None or len(self._other.missed) >= self._patience:
-            self._other, self._fitting = tracker.afresh(), 0
+            self._other, self._fitting = tracker.afresh(trusting=True), 0
         self._blind += tracker.is_blind(seen)
         self._fitting += len(self._other.place(seen, LineMap.empty))
 

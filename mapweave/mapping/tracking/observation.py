@@ -98,6 +98,22 @@ class Observation:
         return LineMap(self.segments[order], polyline, np.ones(len(order), dtype=np.int64))
 
     @property
+    def is_loose(self) -> BoolArray:
+        """Which of `oriented` are on things that may move."""
+        return self.loose[: len(self.oriented)]
+
+    def has_walls(self, least: int, share: float) -> bool:
+        """Whether `least` of its returns, and that `share` of them, are on what cannot move."""
+        solid = np.count_nonzero(~self.is_loose)
+        return bool(solid >= max(least, share * len(self.oriented)))
+
+    def relying_on(self, known: BoolArray) -> "Observation":
+        """Return what it shows of what cannot move, and of things those that are `known` (n,)."""
+        kept = np.flatnonzero(~self.is_loose | known)
+        some = self.oriented.at(kept)
+        return replace(self, oriented=some, walls=some, loose=self.loose[kept])
+
+    @property
     def on_lines(self) -> OrientedPoints:
         """The points that are on segments, each knowing its polyline in `lines`."""
         order, polyline = self._grouped

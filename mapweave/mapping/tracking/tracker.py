@@ -24,6 +24,7 @@ from mapweave.mapping.tracking.acceptance import (
     is_acceptable,
     is_ambiguous,
     is_credible,
+    is_open,
     tell_apart,
     unsettled,
 )
@@ -84,9 +85,17 @@ class Tracker:
         self._before: _State | None = None  # of the scan on probation
         self._probation: Found = []
 
-    def afresh(self) -> "Tracker":
-        """Return a tracker of the same robot that knows no place: it moves as it did."""
+    def afresh(self, *, trusting: bool = False) -> "Tracker":
+        """Return a tracker of the same robot that knows no place: it moves as it did.
+
+        Parameters
+        ----------
+        trusting
+            Whether things that may move are landmarks to it until they are known to move.
+        """
         other = Tracker(self.parameters)
+        if trusting:
+            other._local.trust_things()
         other._motion, other._reachability = self._motion.copy(), self._reachability.afresh()
         return other
 
@@ -149,8 +158,9 @@ class Tracker:
         """Find the pose of an older scan within `reach` [m] of `near` (3,), leaving the track."""
         p = self.parameters.acceptance
         wide = min(max(reach, self.parameters.local_map.search.reach), self.parameters.widest)
-        starts = self._local.search(seen.oriented.points, near, np.pi, wide)
-        return best_by_sight(self._aligned(seen, np.vstack([near, starts])), p)
+        relied = self._relied_on(seen, near)
+        starts = self._local.search(relied.oriented.points, near, np.pi, wide)
+        return best_by_sight(self._aligned(relied, np.vstack([near, starts])), p)
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
@@ -160,17 +170,34 @@ class Tracker:
 
     def _follow(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
         """Go on to `seen`, where it is; miss it, where that is nowhere."""
-        tracked = _first() if self._local.is_empty else self._locate(seen, known)
+        relied = self._relied_on(seen, self._predictions(seen.scan)[0])
+        tracked = _first() if self._local.is_empty else self._locate(relied, known)
         if tracked is None:
             self.missed.append(seen)
             return []
         if not self._local.is_empty:
-            tracked = self._drifted(seen, tracked)
+            tracked = self._drifted(relied, tracked)
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
         self._reachability.placed(seen.scan, tracked.pose)
-        self._local.remember(seen.scan, seen.walls, tracked.pose)
+        loose, held = (
+            seen.loose & self._walled(seen),
+            not is_open(tracked, self.parameters.acceptance),
+        )
+        self._local.remember(seen.scan, seen.walls, loose, tracked.pose, held=held)
         return [(seen, tracked), *self._found_again(seen.scan)]
+
+    def _relied_on(self, seen: Observation, near: FloatArray) -> Observation:
+        """Return what of `seen` tells where it was taken, which is `near` (3,).
+
+        Where things move, those count that are known to stand; where there is little wall, all do.
+        """
+        if not self._local.distrusts_things or not seen.is_loose.any() or not self._walled(seen):
+            return seen
+        return seen.relying_on(self._local.lies_on(seen.oriented, near))
+
+    def _walled(self, seen: Observation) -> bool:
+        return seen.has_walls(self.parameters.min_points, self.parameters.min_solid)
 
     def _drifted(self, seen: Observation, tracked: ScanMatch) -> ScanMatch:
         """Note a step, and how far it may be off; return the scan where it ends, with that."""
@@ -330,7 +357,7 @@ class Tracker:
             thinned, self._local.target, starts, p.local_map.icp, self._prior, share=p.promising
         )
         poses = np.array([fit.pose for fit in fits])
-        judged = self._local.evidence(seen.scan, oriented, seen.loose[: len(oriented)], poses)
+        judged = self._local.evidence(seen.scan, oriented, seen.is_loose, poses)
         since = len(self.missed), self._told(seen.scan)
         steps, drift = se2.between(self.pose, poses), self._drift.covariance
         return [

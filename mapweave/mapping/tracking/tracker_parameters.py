@@ -24,6 +24,13 @@ class TrackerParameters(StageParameters):
     line_spacing: float = derived(
         lambda c: c.mapping.resolution, gt=0, description="[m] between points on the map's lines"
     )
+    min_solid: float = Field(
+        0.3,
+        ge=0,
+        le=1,
+        description="share of the returns on walls, to do without things that may move: in a hall"
+        " full of them they are all there is",
+    )
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
     max_step: float = derived(
         lambda c: 0.5 + c.robot.max_speed * c.sensor.interval,

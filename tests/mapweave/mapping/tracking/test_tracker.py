@@ -96,7 +96,8 @@ def test_a_leap_farther_than_the_search_reaches_is_found_by_the_shapes_of_the_ma
     around = [cast(WALLS, [*start[:2], a], noise=rng) for a in np.linspace(0, 2 * np.pi, 13)]
     leapt = observed(cast(WALLS, np.add(start, leap), noise=rng))
     known = line_map(se2.transform_segments(se2.inverse(start), WALLS))
-    with_shapes, without = (Tracker(TrackerParameters(widest=1.2)) for _ in range(2))
+    narrow = Tracker(TrackerParameters(widest=1.2))
+    with_shapes, without = (narrow.afresh(trusting=True) for _ in range(2))
     for tracker in (with_shapes, without):
         tracked_along(tracker, around)
     [(_, tracked)] = with_shapes.place(leapt, lambda: known)
@@ -174,7 +175,7 @@ def test_in_a_bare_corridor_the_information_along_it_is_nearly_nil(rng: Generato
 
 def test_evidence_counts_for_and_against() -> None:
     """Walls seen before explain a scan; a wall that went through free space is held against it."""
-    tracker = Tracker()
+    tracker = Tracker().afresh(trusting=True)
     tracked_along(tracker, [cast(WALLS, [9, 1.0, 0]), cast(WALLS, [9.4, 1.0, 0])])
     again = placed(tracker, cast(WALLS, [9.2, 1.0, 0]))
     assert again is not None
@@ -190,7 +191,7 @@ def test_evidence_counts_for_and_against() -> None:
 @pytest.mark.parametrize("half", [0.1, 0.3, 0.45])
 def test_what_stands_free_and_is_short_may_have_come_since(half: float) -> None:
     person = np.array([[11.0, 1 + half, 11, 1 - half]])
-    tracker = Tracker()
+    tracker = Tracker().afresh(trusting=True)
     tracked_along(tracker, [cast(WALLS, [9, 1.0, 0]), cast(WALLS, [9.4, 1.0, 0])])
     found = placed(tracker, cast(np.vstack([WALLS, person]), [9.2, 1, 0]))
     assert found is not None
@@ -202,7 +203,7 @@ def test_what_stands_free_and_is_short_may_have_come_since(half: float) -> None:
 def test_a_wall_that_the_scan_sees_through_speaks_against_its_pose() -> None:
     """A box in the corridor, seen twice, is gone: what was known there is seen through."""
     box = np.array([[11.0, 1.3, 11, 0.7]])  # faces the robot
-    tracker = Tracker()
+    tracker = Tracker().afresh(trusting=True)
     there = [cast(np.vstack([WALLS, box]), [x, 1.0, 0]) for x in (9.0, 9.4)]
     tracked_along(tracker, there)
     gone = placed(tracker, cast(WALLS, [9.2, 1.0, 0]))
