@@ -44,6 +44,12 @@ class ComponentMergingParameters(StageParameters):
     min_lines: int = Field(
         3, ge=1, description="straight lines in common: one corner of a hall is like the next"
     )
+    rare: float = Field(
+        60.0,
+        ge=0,
+        description="[bits] of what is shared, as of what tells a place among all of all maps:"
+        " bays that a building repeats have metres of wall in common, and little that is rare",
+    )
     min_confidence: float = Field(
         0.5,
         gt=0,
@@ -198,6 +204,8 @@ class ComponentMerger:
         shapes = self._shape(submaps, older), self._shape(submaps, younger)
         if alignment.decision != "accepted" or not self._tells(*shapes, alignment.transform):
             return None
+        if (alignment.evidence.rarity or 0.0) < self._p.rare:
+            return None  # asked again once either has grown
         if self._is_far_fetched(submaps, (older, younger), alignment):
             return None
         return self._moved(submaps, older, younger, alignment.transform)

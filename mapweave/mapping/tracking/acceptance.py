@@ -92,6 +92,10 @@ class ScanMatch:
         return self.evidence.score + novelty * self.evidence.novel - self.surprise
 
 
+FIRST = ScanMatch(se2.IDENTITY, ScanEvidence(1.0, 0.0, 0.0), np.zeros((3, 3)))
+"""The first scan defines the frame."""
+
+
 def is_credible(tracked: ScanMatch, parameters: AcceptanceParameters) -> bool:
     """Whether a pose convinces, or is hardly disputed and takes no leap to get to."""
     p = parameters

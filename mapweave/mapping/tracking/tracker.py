@@ -19,6 +19,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
+    FIRST,
     ScanMatch,
     best_by_sight,
     is_acceptable,
@@ -28,12 +29,13 @@ from mapweave.mapping.tracking.acceptance import (
     unsettled,
 )
 from mapweave.mapping.tracking.drift import Drift
-from mapweave.mapping.tracking.local_map import LocalMap, ScanEvidence
+from mapweave.mapping.tracking.local_map import LocalMap
 from mapweave.mapping.tracking.motion_model import MotionModel
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.reach import Reach, pace, reach
 from mapweave.mapping.tracking.reachability import Reachability
 from mapweave.mapping.tracking.shape_starts import shape_starts
+from mapweave.mapping.tracking.sweep_time import SweepJudge
 from mapweave.mapping.tracking.tracker_parameters import TrackerParameters
 from mapweave.maps import LineMap
 from mapweave.matching.icp import align_all
@@ -70,8 +72,11 @@ class Tracker:
         blind: these show nothing, but they took their time.
     """
 
-    def __init__(self, parameters: TrackerParameters | None = None) -> None:
+    def __init__(
+        self, parameters: TrackerParameters | None = None, sweeps: SweepJudge | None = None
+    ) -> None:
         self.parameters = parameters or TrackerParameters()
+        self._sweeps = sweeps
         self.pose: FloatArray = se2.IDENTITY
         self.missed: list[Observation] = []
         self._motion = MotionModel(self.parameters.motion_model)
@@ -86,7 +91,7 @@ class Tracker:
 
     def afresh(self) -> "Tracker":
         """Return a tracker of the same robot that knows no place: it moves as it did."""
-        other = Tracker(self.parameters)
+        other = Tracker(self.parameters, self._sweeps)
         other._motion, other._reachability = self._motion.copy(), self._reachability.afresh()
         return other
 
@@ -160,12 +165,14 @@ class Tracker:
 
     def _follow(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
         """Go on to `seen`, where it is; miss it, where that is nowhere."""
-        tracked = _first() if self._local.is_empty else self._locate(seen, known)
+        tracked = FIRST if self._local.is_empty else self._locate(seen, known)
         if tracked is None:
             self.missed.append(seen)
             return []
         if not self._local.is_empty:
             tracked = self._drifted(seen, tracked)
+            if self._sweeps is not None and not self.missed:
+                self._sweeps.ask(seen, self.pose, tracked.pose, self._reachability, self._local)
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
         self._reachability.placed(seen.scan, tracked.pose)
@@ -341,8 +348,3 @@ class Tracker:
     def _thinned(self, seen: Observation) -> OrientedPoints:
         stride = 1 + (len(seen.oriented) - 1) // self.parameters.max_points
         return seen.oriented.at(slice(None, None, stride))
-
-
-def _first() -> ScanMatch:
-    """The first scan defines the frame."""
-    return ScanMatch(se2.IDENTITY, ScanEvidence(1.0, 0.0, 0.0), np.zeros((3, 3)))
