@@ -8,9 +8,9 @@ import pytest
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave.mapping.tracking.observation import ObservationParameters, observe
-from mapweave.mapping.tracking.sweep_time import set_right
+from mapweave.mapping.tracking.sweep_time import SweepParameters, set_right
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import BUILDING, cast, walls_of
 from tests.mapweave.mapping.tracking.test_deskewing import FRONT, swept
@@ -73,8 +73,7 @@ def test_a_lidar_that_does_not_spin_once_a_scan_is_left_as_it_is(sweep: float) -
 
 def test_what_was_mapped_before_a_sweep_was_known_is_mapped_once_more() -> None:
     found = scans(ONCE, 60)
-    silent = Mapper()
-    silent._sweeps.is_open = False
+    silent = Mapper(parameters=MapperParameters(sweeps=SweepParameters(enough=1000)))
     for scan in found:
         silent.add(scan)
     assert worst_turn(mapped(found)) < 0.5 * worst_turn(silent)
