@@ -174,22 +174,33 @@ def is_ambiguous(
     """Whether a remarkable pose, with a `turn` [rad], is not clearly worth most of all `found`.
 
     Those along a direction that its walls leave open are not different: how far along is not known,
-    and its uncertainty says so. But along bare walls half a turn changes nothing: more than a
-    quarter is as well less than one the other way.
+    and its uncertainty says so.
     """
     p = parameters
+    if is_turned_blindly(best, turn, p):
+        return True
     if best.surprise <= p.remarkable:
         return False
-    if abs(turn) > np.pi / 2 and not _is_held(best, p):
-        return True
     least = best.value(p.novelty) - p.lead
     return any(t.value(p.novelty) > least and is_rival(best, t, p) for t in found)
 
 
-def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) -> ScanMatch | None:
+def is_turned_blindly(best: ScanMatch, turn: float, parameters: AcceptanceParameters) -> bool:
+    """Whether nothing tells a `turn` [rad] from one by half a turn more or less.
+
+    Along bare walls half a turn changes nothing: more than a quarter is as well less than one the
+    other way, however often this robot turns round.
+    """
+    return abs(turn) > np.pi / 2 and not _is_held(best, parameters)
+
+
+def best_by_sight(
+    found: Sequence[ScanMatch], near: FloatArray, parameters: AcceptanceParameters
+) -> ScanMatch | None:
     """Return the best of the poses `found` by what was seen and nothing else, if that tells.
 
-    Not where another pose is worth as much: a look-alike.
+    Not where another pose is worth as much: a look-alike; nor where it is turned by more than a
+    quarter against `near` (3,), and nothing holds it.
     """
     p = parameters
 
@@ -197,7 +208,8 @@ def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) 
         return tracked.evidence.score + p.novelty * tracked.evidence.novel
 
     best = max(found, key=worth)
-    if best.evidence.score < p.acceptable:
+    turn = float(se2.wrap(best.pose[2] - near[2]))
+    if best.evidence.score < p.acceptable or is_turned_blindly(best, turn, p):
         return None
     alike = (t for t in found if worth(t) > worth(best) - p.lead)
     return None if any(is_rival(best, t, p) for t in alike) else best

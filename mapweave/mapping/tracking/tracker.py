@@ -25,6 +25,7 @@ from mapweave.mapping.tracking.acceptance import (
     is_acceptable,
     is_ambiguous,
     is_credible,
+    is_turned_blindly,
     tell_apart,
     unsettled,
 )
@@ -155,7 +156,7 @@ class Tracker:
         p = self.parameters.acceptance
         wide = min(max(reach, self.parameters.local_map.search.reach), self.parameters.widest)
         starts = self._local.search(seen.oriented.points, near, np.pi, wide)
-        return best_by_sight(self._aligned(seen, np.vstack([near, starts])), p)
+        return best_by_sight(self._aligned(seen, np.vstack([near, starts])), near, p)
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
@@ -229,7 +230,8 @@ class Tracker:
             best = self._best(found, a.novelty)
             if best is not None and best.evidence.score >= a.convincing and is_credible(best, a):
                 best = self._slid(seen, best, found)
-                if best.surprise <= a.remarkable:
+                turn = self._turn_to(best)
+                if best.surprise <= a.remarkable and not is_turned_blindly(best, turn, a):
                     return self._beside_others(best, found)
                 break
         found += self._reached(seen, self._local.search(points, predicted[0], np.pi, wide))
@@ -245,8 +247,11 @@ class Tracker:
             best = self._slid(seen, best, found)
         elif not is_acceptable(best, self._likely(found, a.novelty), a):
             return None
-        turn = float(se2.wrap(best.pose[2] - self.pose[2]))
-        return None if is_ambiguous(best, found, turn, a) else self._beside_others(best, found)
+        return None if is_ambiguous(best, found, self._turn_to(best), a) else self._beside_others(best, found)
+
+    def _turn_to(self, tracked: ScanMatch) -> float:
+        """[rad] from the last scan that was placed."""
+        return float(se2.wrap(tracked.pose[2] - self.pose[2]))
 
     def _beside_others(self, best: ScanMatch, found: list[ScanMatch]) -> ScanMatch:
         """Return the best, with how far it may be off where others are worth about as much."""
