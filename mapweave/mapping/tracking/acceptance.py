@@ -185,6 +185,12 @@ def is_ambiguous(
     return any(t.value(p.novelty) > least and is_rival(best, t, p) for t in found)
 
 
+def is_unremarkable(best: ScanMatch, turn: float, parameters: AcceptanceParameters) -> bool:
+    """Whether a pose, with a `turn` [rad], need not be compared with everything else."""
+    p = parameters
+    return best.surprise <= p.remarkable and not is_turned_blindly(best, turn, p)
+
+
 def is_turned_blindly(best: ScanMatch, turn: float, parameters: AcceptanceParameters) -> bool:
     """Whether nothing tells a `turn` [rad] from one by half a turn more or less.
 
@@ -194,13 +200,10 @@ def is_turned_blindly(best: ScanMatch, turn: float, parameters: AcceptanceParame
     return abs(turn) > np.pi / 2 and not _is_held(best, parameters)
 
 
-def best_by_sight(
-    found: Sequence[ScanMatch], near: FloatArray, parameters: AcceptanceParameters
-) -> ScanMatch | None:
+def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) -> ScanMatch | None:
     """Return the best of the poses `found` by what was seen and nothing else, if that tells.
 
-    Not where another pose is worth as much: a look-alike; nor where it is turned by more than a
-    quarter against `near` (3,), and nothing holds it.
+    Not where another pose is worth as much: a look-alike; nor where something is left open.
     """
     p = parameters
 
@@ -208,8 +211,7 @@ def best_by_sight(
         return tracked.evidence.score + p.novelty * tracked.evidence.novel
 
     best = max(found, key=worth)
-    turn = float(se2.wrap(best.pose[2] - near[2]))
-    if best.evidence.score < p.acceptable or is_turned_blindly(best, turn, p):
+    if best.evidence.score < p.acceptable or not _is_held(best, p):
         return None
     alike = (t for t in found if worth(t) > worth(best) - p.lead)
     return None if any(is_rival(best, t, p) for t in alike) else best
@@ -234,14 +236,14 @@ def unsettled(
         What a return at a new place counts there.
     """
     p = parameters
-    if best.surprise <= p.remarkable or not _is_open(best, p):
+    if best.surprise <= p.remarkable or not is_open(best, p):
         return 0.0
     least = best.value(novelty) - p.lead
     alike = [t for t in _rivals(best, found, p) if t.value(novelty) > least]
     return max((_apart(best, t) for t in alike if _is_slid(best, t, p)), default=0.0)
 
 
-def _is_open(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
+def is_open(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
     """Whether its walls leave a direction open."""
     held = ellipse(tracked.information)
     return held.least <= p.open_direction * held.most
@@ -249,7 +251,7 @@ def _is_open(tracked: ScanMatch, p: AcceptanceParameters) -> bool:
 
 def _is_slid(best: ScanMatch, other: ScanMatch, p: AcceptanceParameters) -> bool:
     """Whether `other` is `best`, but for how far along an open direction it is."""
-    if not _is_open(best, p) or abs(se2.wrap(other.pose[2] - best.pose[2])) > p.rival_turn:
+    if not is_open(best, p) or abs(se2.wrap(other.pose[2] - best.pose[2])) > p.rival_turn:
         return False
     across = np.linalg.eigh(best.information[:2, :2])[1][:, 1]
     return bool(abs(across @ (other.pose - best.pose)[:2]) <= p.rival_distance)

@@ -17,7 +17,6 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
     FIRST,
     ScanMatch,
@@ -25,7 +24,8 @@ from mapweave.mapping.tracking.acceptance import (
     is_acceptable,
     is_ambiguous,
     is_credible,
-    is_turned_blindly,
+    is_open,
+    is_unremarkable,
     tell_apart,
     unsettled,
 )
@@ -36,6 +36,7 @@ from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.reach import Reach, pace, reach
 from mapweave.mapping.tracking.reachability import Reachability
 from mapweave.mapping.tracking.shape_starts import shape_starts
+from mapweave.mapping.tracking.slides import slide_starts
 from mapweave.mapping.tracking.sweep_time import SweepJudge
 from mapweave.mapping.tracking.tracker_parameters import TrackerParameters
 from mapweave.maps import LineMap
@@ -156,7 +157,7 @@ class Tracker:
         p = self.parameters.acceptance
         wide = min(max(reach, self.parameters.local_map.search.reach), self.parameters.widest)
         starts = self._local.search(seen.oriented.points, near, np.pi, wide)
-        return best_by_sight(self._aligned(seen, np.vstack([near, starts])), near, p)
+        return best_by_sight(self._aligned(seen, np.vstack([near, starts])), p)
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
@@ -230,8 +231,7 @@ class Tracker:
             best = self._best(found, a.novelty)
             if best is not None and best.evidence.score >= a.convincing and is_credible(best, a):
                 best = self._slid(seen, best, found)
-                turn = self._turn_to(best)
-                if best.surprise <= a.remarkable and not is_turned_blindly(best, turn, a):
+                if is_unremarkable(best, self._turn_to(best), a):
                     return self._beside_others(best, found)
                 break
         found += self._reached(seen, self._local.search(points, predicted[0], np.pi, wide))
@@ -247,7 +247,11 @@ class Tracker:
             best = self._slid(seen, best, found)
         elif not is_acceptable(best, self._likely(found, a.novelty), a):
             return None
-        return None if is_ambiguous(best, found, self._turn_to(best), a) else self._beside_others(best, found)
+        return (
+            None
+            if is_ambiguous(best, found, self._turn_to(best), a)
+            else self._beside_others(best, found)
+        )
 
     def _turn_to(self, tracked: ScanMatch) -> float:
         """[rad] from the last scan that was placed."""
@@ -312,19 +316,11 @@ class Tracker:
 
         Every place within reach is tried, and where the pace would lead; what both saw decides.
         """
-        p = self.parameters
-        held = ellipse(tracked.information)
-        if held.least > p.acceptance.open_direction * held.most:
+        p, reached = self.parameters, self._window(seen.scan)
+        if not is_open(tracked, p.acceptance):
             return []
-        along, across = np.linalg.eigh(tracked.information[:2, :2])[1].T
-        way = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))[:2]
-        usual = se2.rotation(self.pose[2]) @ way @ along
-        count = round(self._window(seen.scan) / p.open_step)
-        steps = np.append(np.arange(-count, count + 1) * p.open_step, usual)
-        aside = across @ (tracked.pose - self.pose)[:2]
-        at = self.pose[:2] + steps[:, None] * along + aside * across
-        starts = np.column_stack([at, np.full(len(at), tracked.pose[2])])
-        return self._reached(seen, starts)
+        way = self._motion.way(self._turn_to(tracked))[:2]
+        return self._reached(seen, slide_starts(tracked, self.pose, way, reached, p.open_step))
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
@@ -336,8 +332,7 @@ class Tracker:
         """Align from each of `starts` (k, 3), and judge where that ends."""
         if len(starts) == 0:
             return []
-        p = self.parameters
-        oriented, thinned = seen.oriented, self._thinned(seen)
+        p, oriented, thinned = self.parameters, seen.oriented, self._thinned(seen)
         fits = align_all(
             thinned, self._local.target, starts, p.local_map.icp, self._prior, share=p.promising
         )
