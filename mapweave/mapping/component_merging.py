@@ -44,6 +44,18 @@ class ComponentMergingParameters(StageParameters):
     min_lines: int = Field(
         3, ge=1, description="straight lines in common: one corner of a hall is like the next"
     )
+    rare: float = Field(
+        60.0,
+        ge=0,
+        description="[bits] of what is shared, as of what tells a place among all of all maps:"
+        " bays that a building repeats have metres of wall in common, and little that is rare",
+    )
+    rare_there: float = Field(
+        40.0,
+        ge=0,
+        description="[bits] of a place where the robot lost track: 20 less, as no pair of maps is"
+        " picked there from a million, nor a place from half a million",
+    )
     min_confidence: float = Field(
         0.5,
         gt=0,
@@ -194,10 +206,12 @@ class ComponentMerger:
         """Return `submaps` with two components as one, where what both saw proves it."""
         self._compared[older, younger] = self._walls[older], self._walls[younger]
         self._due.remove((older, younger))
-        alignment = self._compare(submaps, older, younger)
+        alignment, rare = self._compare(submaps, older, younger)
         shapes = self._shape(submaps, older), self._shape(submaps, younger)
         if alignment.decision != "accepted" or not self._tells(*shapes, alignment.transform):
             return None
+        if (alignment.evidence.rarity or 0.0) < rare:
+            return None  # asked again once either has grown
         if self._is_far_fetched(submaps, (older, younger), alignment):
             return None
         return self._moved(submaps, older, younger, alignment.transform)
@@ -223,17 +237,22 @@ class ComponentMerger:
         found = count_common_lines(*rasters, transform, second.lines, p.fusion.verification)
         return found >= p.min_lines
 
-    def _compare(self, submaps: Sequence[Submap], older: int, younger: int) -> Alignment:
-        """Compare two components anywhere, and where that leaves it open, where track was lost."""
+    def _compare(
+        self, submaps: Sequence[Submap], older: int, younger: int
+    ) -> tuple[Alignment, float]:
+        """Compare two components anywhere, and where that leaves it open, where track was lost.
+
+        Returns how rare [bits] what they share must be as well.
+        """
         first, second = self._shape(submaps, older), self._shape(submaps, younger)
         names, p = ("older", "younger"), self._p
         anywhere = compare(names[0], first, names[1], second, p.fusion, closely=True)
         accepted = anywhere.decision == "accepted"
         if accepted and not self._leap_judge.leaps(submaps, (older, younger), anywhere.transform):
-            return anywhere
+            return anywhere, p.rare
         possible = between_them(submaps, older, younger, p.gaps)
         if len(possible) == 0:
-            return anywhere
+            return anywhere, p.rare
         proof = {"min_confidence": p.min_confidence, "min_lead": p.min_lead}
         # Where track was lost, the room that is there is the same room.
         expected = p.fusion.model_copy(
@@ -245,7 +264,8 @@ class ComponentMerger:
         here = compare(names[0], first, names[1], second, expected, possible)
         # A better place elsewhere says that it was carried away.
         best = max(anywhere.evidence.score or 0.0, 0.0)
-        return here if (here.evidence.score or 0.0) >= 0.95 * best else anywhere
+        is_there = (here.evidence.score or 0.0) >= 0.95 * best
+        return (here, p.rare_there) if is_there else (anywhere, p.rare)
 
     def _shape(self, submaps: Sequence[Submap], component: int) -> PreparedMap | None:
         """Prepare a component, unless it is as it was the last time."""

@@ -30,6 +30,7 @@ from mapweave.mapping.tracking.pose_covariance import (
     pose_uncertainty,
     turn_uncertainty,
 )
+from mapweave.mapping.tracking.sweep_time import SweepJudge, SweepParameters
 from mapweave.mapping.tracking.tracker import Found, Tracker, TrackerParameters
 from mapweave.maps import LineMap, MadeWith, RobotMap, Submap
 from mapweave.parameters import StageParameters, derived
@@ -46,6 +47,7 @@ class MapperParameters(StageParameters):
     own_body: OwnBodyParameters = derived(OwnBodyParameters.of)
     observation: ObservationParameters = derived(ObservationParameters.of)
     tracker: TrackerParameters = derived(TrackerParameters.of)
+    sweeps: SweepParameters = derived(SweepParameters.of)
     uncertainty: PoseCovarianceParameters = derived(PoseCovarianceParameters.of)
     backend: BackendParameters = derived(BackendParameters.of)
     patience: int = derived(
@@ -117,12 +119,14 @@ class Mapper:
         self._marks = marks_to_continue(known)
         self._component = self._newest_component = first_component(self._finished)
         self._on_warning = on_warning
+        self._said: set[str] = set()  # of what is odd
         self._body = OwnBody(self.parameters.own_body)
         # Scans to be placed: the last, and after a loss those that were missed before it.
         self._waiting: deque[Observation] = deque()
         # Raw scans so far, as long as no submap is finished.
         self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
-        self._tracker = Tracker(self.parameters.tracker)
+        self._sweeps = SweepJudge(self.parameters.sweeps)
+        self._tracker = Tracker(self.parameters.tracker, self._sweeps)
         self._loss = Loss(self.parameters.patience)
         self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
@@ -164,7 +168,7 @@ class Mapper:
         check_kind("scan", scan, Scan)
         scan = self._numbered(scan)
         finished = len(self._finished)
-        if self._body.watch(scan):
+        if self._body.watch(scan) or self._sweeps.take_news():
             self._judge_again()
         placed, lost = self._take(scan)
         pose, uncertainty = self._whereabouts() if placed else (None, None)
@@ -233,7 +237,7 @@ class Mapper:
         """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
         if not self._has_finished:
             self._early.append(scan)
-        straight = self._deskewer.straight(self._body.without(scan))
+        straight = self._deskewer.straight(self._sweeps.swept(self._body.without(scan)))
         seen = self.seen = observe(straight, self.parameters.observation)
         self._waiting.append(seen)
         placed = lost = False
@@ -269,15 +273,16 @@ class Mapper:
     def _judge_again(self) -> None:
         """Map all there is once more, as it is now known what of it is the robot's own body.
 
-        What is in a finished submap stays as it is.
+        Or how long its sweeps take. What is in a finished submap stays as it is.
         """
         self._say_body()
+        self._say_sweep()
         if self._has_finished:
             return
         early = list(self._early)
         self._early.clear()
         self._waiting.clear()
-        self._tracker = Tracker(self.parameters.tracker)
+        self._tracker = Tracker(self.parameters.tracker, self._sweeps)
         self._loss = Loss(self.parameters.patience)
         self._deskewer = Deskewer()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
@@ -289,14 +294,26 @@ class Mapper:
 
     def _say_body(self) -> None:
         """Tell once that the robot sees itself."""
-        if self._on_warning is None or not self._body.reach.any():
-            return
-        wide, far = self._body.extent
-        self._on_warning(
-            f"{self.robot} sees itself: {wide:.0f}° of its field of view, up to {far:.2f} m away,"
-            " keep their place while all else moves; what is there is left out"
-        )
-        self._on_warning = None
+        if self._body.reach.any():
+            wide, far = self._body.extent
+            self._say_once(
+                f"{self.robot} sees itself: {wide:.0f}° of its field of view, up to {far:.2f} m"
+                " away, keep their place while all else moves; what is there is left out"
+            )
+
+    def _say_sweep(self) -> None:
+        """Tell once that its lidar was found to spin once a scan."""
+        if self._sweeps.sweep:
+            self._say_once(
+                f"the lidar of {self.robot} takes {abs(self._sweeps.sweep):.3f} s from its first"
+                " beam to the last, though its scans do not say so: where the robot turns they fit"
+                " better so, and are set right"
+            )
+
+    def _say_once(self, words: str) -> None:
+        if self._on_warning is not None and words[:20] not in self._said:
+            self._said.add(words[:20])
+            self._on_warning(words)
 
     def _place(self, seen: Observation) -> bool:
         """Follow the robot to a scan; merge it, and those missed before it."""

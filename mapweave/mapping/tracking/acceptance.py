@@ -92,6 +92,10 @@ class ScanMatch:
         return self.evidence.score + novelty * self.evidence.novel - self.surprise
 
 
+FIRST = ScanMatch(se2.IDENTITY, ScanEvidence(1.0, 0.0, 0.0), np.zeros((3, 3)))
+"""The first scan defines the frame."""
+
+
 def is_credible(tracked: ScanMatch, parameters: AcceptanceParameters) -> bool:
     """Whether a pose convinces, or is hardly disputed and takes no leap to get to."""
     p = parameters
@@ -170,22 +174,36 @@ def is_ambiguous(
     """Whether a remarkable pose, with a `turn` [rad], is not clearly worth most of all `found`.
 
     Those along a direction that its walls leave open are not different: how far along is not known,
-    and its uncertainty says so. But along bare walls half a turn changes nothing: more than a
-    quarter is as well less than one the other way.
+    and its uncertainty says so.
     """
     p = parameters
+    if is_turned_blindly(best, turn, p):
+        return True
     if best.surprise <= p.remarkable:
         return False
-    if abs(turn) > np.pi / 2 and not _is_held(best, p):
-        return True
     least = best.value(p.novelty) - p.lead
     return any(t.value(p.novelty) > least and is_rival(best, t, p) for t in found)
+
+
+def is_unremarkable(best: ScanMatch, turn: float, parameters: AcceptanceParameters) -> bool:
+    """Whether a pose, with a `turn` [rad], need not be compared with everything else."""
+    p = parameters
+    return best.surprise <= p.remarkable and not is_turned_blindly(best, turn, p)
+
+
+def is_turned_blindly(best: ScanMatch, turn: float, parameters: AcceptanceParameters) -> bool:
+    """Whether nothing tells a `turn` [rad] from one by half a turn more or less.
+
+    Along bare walls half a turn changes nothing: more than a quarter is as well less than one the
+    other way, however often this robot turns round.
+    """
+    return abs(turn) > np.pi / 2 and not _is_held(best, parameters)
 
 
 def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) -> ScanMatch | None:
     """Return the best of the poses `found` by what was seen and nothing else, if that tells.
 
-    Not where another pose is worth as much: a look-alike.
+    Not where another pose is worth as much: a look-alike; nor where something is left open.
     """
     p = parameters
 
@@ -193,7 +211,7 @@ def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) 
         return tracked.evidence.score + p.novelty * tracked.evidence.novel
 
     best = max(found, key=worth)
-    if best.evidence.score < p.acceptable:
+    if best.evidence.score < p.acceptable or not _is_held(best, p):
         return None
     alike = (t for t in found if worth(t) > worth(best) - p.lead)
     return None if any(is_rival(best, t, p) for t in alike) else best

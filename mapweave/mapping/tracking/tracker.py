@@ -17,24 +17,27 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.geometry.ellipses import ellipse
 from mapweave.mapping.tracking.acceptance import (
+    FIRST,
     ScanMatch,
     best_by_sight,
     is_acceptable,
     is_ambiguous,
     is_credible,
     is_open,
+    is_unremarkable,
     tell_apart,
     unsettled,
 )
 from mapweave.mapping.tracking.drift import Drift
-from mapweave.mapping.tracking.local_map import LocalMap, ScanEvidence
+from mapweave.mapping.tracking.local_map import LocalMap
 from mapweave.mapping.tracking.motion_model import MotionModel
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.reach import Reach, pace, reach
 from mapweave.mapping.tracking.reachability import Reachability
 from mapweave.mapping.tracking.shape_starts import shape_starts
+from mapweave.mapping.tracking.slides import slide_starts
+from mapweave.mapping.tracking.sweep_time import SweepJudge
 from mapweave.mapping.tracking.tracker_parameters import TrackerParameters
 from mapweave.maps import LineMap
 from mapweave.matching.icp import align_all
@@ -71,8 +74,11 @@ class Tracker:
         blind: these show nothing, but they took their time.
     """
 
-    def __init__(self, parameters: TrackerParameters | None = None) -> None:
+    def __init__(
+        self, parameters: TrackerParameters | None = None, sweeps: SweepJudge | None = None
+    ) -> None:
         self.parameters = parameters or TrackerParameters()
+        self._sweeps = sweeps
         self.pose: FloatArray = se2.IDENTITY
         self.missed: list[Observation] = []
         self._motion = MotionModel(self.parameters.motion_model)
@@ -93,7 +99,7 @@ class Tracker:
         trusting
             Whether things that may move are landmarks to it until they are known to move.
         """
-        other = Tracker(self.parameters)
+        other = Tracker(self.parameters, self._sweeps)
         if trusting:
             other._local.trust_things()
         other._motion, other._reachability = self._motion.copy(), self._reachability.afresh()
@@ -171,12 +177,14 @@ class Tracker:
     def _follow(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
         """Go on to `seen`, where it is; miss it, where that is nowhere."""
         relied = self._relied_on(seen, self._predictions(seen.scan)[0])
-        tracked = _first() if self._local.is_empty else self._locate(relied, known)
+        tracked = FIRST if self._local.is_empty else self._locate(relied, known)
         if tracked is None:
             self.missed.append(seen)
             return []
         if not self._local.is_empty:
             tracked = self._drifted(relied, tracked)
+            if self._sweeps is not None and not self.missed:
+                self._sweeps.ask(seen, self.pose, tracked.pose, self._reachability, self._local)
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
         self._reachability.placed(seen.scan, tracked.pose)
@@ -249,7 +257,7 @@ class Tracker:
             best = self._best(found, a.novelty)
             if best is not None and best.evidence.score >= a.convincing and is_credible(best, a):
                 best = self._slid(seen, best, found)
-                if best.surprise <= a.remarkable:
+                if is_unremarkable(best, self._turn_to(best), a):
                     return self._beside_others(best, found)
                 break
         found += self._reached(seen, self._local.search(points, predicted[0], np.pi, wide))
@@ -265,8 +273,15 @@ class Tracker:
             best = self._slid(seen, best, found)
         elif not is_acceptable(best, self._likely(found, a.novelty), a):
             return None
-        turn = float(se2.wrap(best.pose[2] - self.pose[2]))
-        return None if is_ambiguous(best, found, turn, a) else self._beside_others(best, found)
+        return (
+            None
+            if is_ambiguous(best, found, self._turn_to(best), a)
+            else self._beside_others(best, found)
+        )
+
+    def _turn_to(self, tracked: ScanMatch) -> float:
+        """[rad] from the last scan that was placed."""
+        return float(se2.wrap(tracked.pose[2] - self.pose[2]))
 
     def _beside_others(self, best: ScanMatch, found: list[ScanMatch]) -> ScanMatch:
         """Return the best, with how far it may be off where others are worth about as much."""
@@ -327,19 +342,11 @@ class Tracker:
 
         Every place within reach is tried, and where the pace would lead; what both saw decides.
         """
-        p = self.parameters
-        held = ellipse(tracked.information)
-        if held.least > p.acceptance.open_direction * held.most:
+        p, reached = self.parameters, self._window(seen.scan)
+        if not is_open(tracked, p.acceptance):
             return []
-        along, across = np.linalg.eigh(tracked.information[:2, :2])[1].T
-        way = self._motion.way(float(se2.wrap(tracked.pose[2] - self.pose[2])))[:2]
-        usual = se2.rotation(self.pose[2]) @ way @ along
-        count = round(self._window(seen.scan) / p.open_step)
-        steps = np.append(np.arange(-count, count + 1) * p.open_step, usual)
-        aside = across @ (tracked.pose - self.pose)[:2]
-        at = self.pose[:2] + steps[:, None] * along + aside * across
-        starts = np.column_stack([at, np.full(len(at), tracked.pose[2])])
-        return self._reached(seen, starts)
+        way = self._motion.way(self._turn_to(tracked))[:2]
+        return self._reached(seen, slide_starts(tracked, self.pose, way, reached, p.open_step))
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:
         """Poses (k, 3) where polylines of the scan lie on corresponding ones of the map (V)."""
@@ -351,8 +358,7 @@ class Tracker:
         """Align from each of `starts` (k, 3), and judge where that ends."""
         if len(starts) == 0:
             return []
-        p = self.parameters
-        oriented, thinned = seen.oriented, self._thinned(seen)
+        p, oriented, thinned = self.parameters, seen.oriented, self._thinned(seen)
         fits = align_all(
             thinned, self._local.target, starts, p.local_map.icp, self._prior, share=p.promising
         )
@@ -368,8 +374,3 @@ class Tracker:
     def _thinned(self, seen: Observation) -> OrientedPoints:
         stride = 1 + (len(seen.oriented) - 1) // self.parameters.max_points
         return seen.oriented.at(slice(None, None, stride))
-
-
-def _first() -> ScanMatch:
-    """The first scan defines the frame."""
-    return ScanMatch(se2.IDENTITY, ScanEvidence(1.0, 0.0, 0.0), np.zeros((3, 3)))

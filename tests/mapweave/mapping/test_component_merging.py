@@ -57,6 +57,15 @@ def test_a_component_that_shares_a_shape_with_an_older_one_joins_it(
         assert after.map is before.map  # a finished submap never changes, only its pose does
 
 
+def test_what_two_components_share_is_rare_or_they_wait(parts: list[LineMap]) -> None:
+    submaps = [submap(0, 0, se2.IDENTITY, parts[0]), submap(1, 1, se2.IDENTITY, parts[2])]
+    submaps += [submap(2, 0, se2.IDENTITY, parts[1])]
+    usual = ComponentMergingParameters()
+    for rare, is_joined in ((usual.rare, True), (10_000.0, False)):
+        asking = usual.model_copy(update={"rare": rare, "rare_there": rare})
+        assert bool(ComponentMerger(asking).reunite(submaps)[1]) == is_joined
+
+
 def test_a_component_of_another_place_stays_apart(parts: list[LineMap], rng: Generator) -> None:
     submaps = [
         submap(0, 0, random_pose(rng), parts[0]),

@@ -1,5 +1,7 @@
 """After a miss only what can be told from look-alikes counts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -137,3 +139,17 @@ def test_a_scan_that_was_missed_is_not_placed_where_two_places_are_alike() -> No
     assert best_by_sight([along, best], P) is best
     assert best_by_sight([best, other], P) is None
     assert best_by_sight([pose(0.0, 0.3, 0.1)], P) is None
+
+
+def test_a_scan_that_was_missed_is_not_placed_where_a_direction_is_open() -> None:
+    assert best_by_sight([pose(0.0, 0.9, information=ALONG_Y)], P) is None
+
+
+def test_along_bare_walls_nobody_turns_round_unseen() -> None:
+    turned = ScanMatch(
+        np.array([0.0, 0.0, 3.0]), ScanEvidence(0.9, 0.0, 0.0), ALONG_Y, surprise=0.01
+    )
+    held = replace(turned, information=np.diag([5.0, 70.0, 9.0]))
+    assert is_ambiguous(turned, [turned], 3.0, P)
+    assert not is_ambiguous(turned, [turned], 1.0, P)
+    assert not is_ambiguous(held, [held], 3.0, P)

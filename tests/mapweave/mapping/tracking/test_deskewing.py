@@ -7,8 +7,9 @@ import pytest
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave.mapping.tracking.deskewing import Deskewer, deskewed
+from mapweave.mapping.tracking.sweep_time import SweepParameters
 from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
 from tests.mapweave.buildings import BUILDING, cast, walls_of
@@ -73,7 +74,8 @@ def test_returns_come_only_from_where_something_was_seen() -> None:
 
 def drive(way: Way, seconds: float, period: float, *, told: bool) -> FloatArray:
     """Map a drive; return how far off each step of a second is found [m], [rad]."""
-    mapper, found, true = Mapper(), [], []
+    given = MapperParameters(sweeps=SweepParameters(enough=1000))  # which asks for more turns
+    mapper, found, true = Mapper(parameters=given), [], []
     for k in range(int(seconds / period)):
         scan = swept(way, k * period, AROUND, index=k)
         if not told:
