@@ -1,24 +1,22 @@
 """A robot: its scans become its map, its map and its peers' maps become alignments."""
 
 import logging
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from itertools import chain
 
 import zenoh
 
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.scan_mapper import ScanMapper
-from mapweave.maps import Alignment, RobotMap
+from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
 from mapweave_agent.by_hand.kept_orders import KeptOrders
-from mapweave_agent.by_hand.own_marks import Frame, OwnMarks
-from mapweave_agent.comparing.outcomes import found_in, message_of
+from mapweave_agent.by_hand.own_marks import Frame
+from mapweave_agent.comparing.findings import Findings
 from mapweave_agent.comparison_schedule import ComparisonSchedule
-from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
+from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.listening import listening
 from mapweave_agent.live.attending import attending
@@ -26,13 +24,13 @@ from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
 from mapweave_agent.outbox import Outbox
-from mapweave_agent.past_runs import PastRun, StateFolder, numbered_from
+from mapweave_agent.own_map import OwnMap
+from mapweave_agent.past_runs import PastRun, StateFolder
 from mapweave_agent.publication_schedule import (
     AgentParameters,
     PublicationSchedule,
     RegularSchedule,
 )
-from mapweave_agent.single_scan_filter import without_strays
 from mapweave_agent.source import ReplayClock
 from mapweave_protocol.link.asking import (
     ALL_ORDERS,
@@ -42,7 +40,7 @@ from mapweave_protocol.link.asking import (
 )
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.status_schedule import StatusSchedule
-from mapweave_protocol.wire.messages import MapVersion, PoseMessage, StatusMessage
+from mapweave_protocol.wire.messages import PoseMessage, StatusMessage
 
 POLL = 0.1  # [s] after which a signal, an outcome or what is due is noticed
 LIVE_POLL = 0.05  # [s] after which it is noticed that no scans come, or nothing arrives
@@ -94,27 +92,22 @@ class AgentRun:
         self._session = session
         self._team = team
         self._mapper = mapper
-        self._comparer = comparer
         self._total = total
-        self._parameters = parameters
+        self._parameters = p = parameters
         self._state = state
         self._past = {run.state: run for run in past}
-        self._first = first
         self._tell = tell
         self._publication = PublicationSchedule(parameters)
-        self._statuses = StatusSchedule(
-            parameters.status_interval, parameters.least_status_interval
-        )
+        self._statuses = StatusSchedule(p.status_interval, p.least_status_interval)
         self._keeping = RegularSchedule(parameters.state_interval)
         self._comparisons = ComparisonSchedule(mapper.robot, parameters)
         for run in past:
             self._comparisons.earlier_map(run.map)
         self._needs = Needs(mapper.robot)
         self._whereabouts = Whereabouts(mapper.robot, mapper.boot, first)
-        # A stored map that it begins with is there, and may be asked for, before the first scan.
-        self._published: RobotMap = numbered_from(mapper.robot_map(), first)
-        self._placed_before = _scans_placed(self._published)
-        self._marks = OwnMarks(mapper.robot, mapper.boot, self._published.marks)
+        self._map = OwnMap(mapper, first)
+        if self._map.known is not None:
+            self._comparisons.follow_in(self._map.known)
         self._orders = KeptOrders(state)
         self._reception = Dispatcher(
             mapper.robot,
@@ -125,13 +118,19 @@ class AgentRun:
             self._orders,
         )
         self._outbox = Outbox(session, team, mapper.robot, mapper.boot, state.sender)
+        self._findings = Findings(
+            self._map,
+            comparer,
+            self._comparisons,
+            self._outbox,
+            self._needs,
+            self._whereabouts,
+            state,
+        )
         self._inbox = Inbox()
-        self._mapping = threading.Lock()
         self._live: LiveScans | None = None
         self._scans_seen = 0
-        self._changed = False
-        self._unkept = False
-        self._finished = False
+        self._changed = self._unkept = self._finished = False
 
     @property
     def finished(self) -> bool:
@@ -141,17 +140,15 @@ class AgentRun:
     @property
     def robot_map(self) -> RobotMap:
         """The map as it was published last, with the marks that the robot made."""
-        return replace(self._published, marks=self._marks.all)
+        return self._map.whole
 
     def mark(self, label: str, place: FloatArray, frame: Frame) -> str:
         """Mark a (2,) `place` [m] from any thread; as of `OwnMarks.add`."""
-        with self._mapping:
-            snapshot = self._mapper.snapshot()
-        return self._marks.add(snapshot.submaps, label, place, frame, time.time())
+        return self._map.mark(label, place, frame)
 
     def take_back_mark(self, identity: str) -> None:
         """Take a mark back; as of `OwnMarks.remove`."""
-        self._marks.remove(identity)
+        self._map.marks.remove(identity)
 
     def run(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         """Map all `scans` of a recording, then compare with the peers until `stopping`.
@@ -179,7 +176,7 @@ class AgentRun:
                 while not (stopping() or scans.ended or failed()):
                     scan = scans.take(LIVE_POLL)
                     if scan is not None:
-                        self._map(scan)
+                        self._take(scan)
             self._compare_until(stopping)
 
     @contextmanager
@@ -203,7 +200,7 @@ class AgentRun:
         if self._changed and not self._finished:
             self._publish_map()
         deadline = time.monotonic() + self._parameters.leave_within
-        while not self._needs.delivered(self._state_published) and time.monotonic() < deadline:
+        while not self._needs.delivered(self._map.state) and time.monotonic() < deadline:
             self._attend(POLL)
 
     def _map_all(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
@@ -215,11 +212,10 @@ class AgentRun:
                 self._attend(min(left, POLL))
             if stopping():
                 return
-            self._map(scan)
+            self._take(scan)
 
-    def _map(self, scan: Scan) -> None:
-        with self._mapping:
-            placement = self._mapper.add(scan)
+    def _take(self, scan: Scan) -> None:
+        placement = self._map.add(scan)
         pose = self._whereabouts.message(scan, placement, time.time())
         if pose is not None:
             self._outbox.send_pose(pose)
@@ -242,9 +238,9 @@ class AgentRun:
         self._publish_status()
         _log.info(
             "finished: %d of %d scans placed, submaps: %d",
-            self._scans_placed,
+            self._map.scans_placed,
             self._scans_seen,
-            len(self._published.submaps),
+            len(self._map.told.submaps),
         )
 
     def _attend(self, wait: float) -> None:
@@ -260,13 +256,14 @@ class AgentRun:
         if self._reception.met():
             self._statuses.met(now)
             self._needs.met(now)
-        if self._marks.is_news:
+        if self._map.marks.is_news:
             self._publish_marks()
         if self._changed and not self._finished and self._publication.due(now):
             self._publish_map()
         if self._unkept and not self._finished and self._keeping.due(now):
-            self._keep(self._draw())
-        self._compare(now)
+            self._unkept = False  # what changes while it is drawn is still to be kept
+            self._keep(self._map.drawn())
+        self._findings.compare(now, self._map.told)
         self._supply(now)
         if self._statuses.due(now, self._state_told, lacks=bool(self._reception.lacking)):
             self._publish_status()
@@ -276,7 +273,7 @@ class AgentRun:
         """What others are told at once when it changes."""
         # Who still drives says so soon anyway.
         now = self._finished and (dict(self._comparisons.published), self._comparisons.held)
-        return now, len(self._published.components), self._reception.lacking
+        return now, len(self._map.told.components), self._reception.lacking
 
     def _supply(self, now: float) -> None:
         """Send again what others lack, answer who has asked, and ask for what is lacking here."""
@@ -284,91 +281,49 @@ class AgentRun:
         past = chain.from_iterable(run.found for run in self._past.values())
         found = chain(past, self._comparisons.orphans, self._outbox.found)
         marked = {run.marks_state: run.marks for run in self._past.values()}
-        marks = [s for s in (self._marks.state, *marked) if s is not None]
-        missing = self._needs.missing(self._state_published, found, now, self._past, marks)
+        marks = [s for s in (self._map.marks.state, *marked) if s is not None]
+        missing = self._needs.missing(self._map.state, found, now, self._past, marks)
         if missing.map:
-            self._outbox.send_map(self._published, complete=True)
+            self._outbox.send_map(self._map.told, complete=True)
         for run in missing.past:
             self._outbox.send_past(self._past[run])
         for message in missing.alignments:
             self._outbox.send_alignments(message)
             self._needs.published(now, message)
         for run in missing.marks:
-            self._outbox.send_marks(marked.get(run) or self._marks.message())
+            self._outbox.send_marks(marked.get(run) or self._map.marks.message())
         if self._orders.lacks(now):
             request_orders_of_coordinator(self._session, self._team, self._inbox.put)
         answers = {ALL_ORDERS: lambda: self._orders.message, ITS_STATUS: self._status}
-        self._outbox.answer(self._published, answers)
+        self._outbox.answer(self._map.told, answers)
         for state in self._comparisons.to_ask_for(now):
             request_map(self._session, self._team, state, self._inbox.add)
 
-    def _compare(self, now: float) -> None:
-        """Publish the outcome of the comparison under way, if there is one; begin the next."""
-        outcome = self._comparer.take()
-        if outcome is not None:
-            found = self._publish_outcome(outcome)
-            self._comparisons.done(outcome.comparison, now, outcome.took, found)
-        if not self._comparer.busy:
-            comparison = self._comparisons.begin(now)
-            if comparison is not None:
-                ends = comparison.reference.robot, comparison.other.robot
-                self._outbox.prepare_alignments(*ends)
-                self._comparer.start(comparison)
-
-    def _publish_outcome(self, outcome: ComparisonOutcome) -> Sequence[Alignment]:
-        """Publish what was found, if it is news; return it, nothing where comparing failed."""
-        have_met = self._comparisons.have_met(outcome.comparison)
-        found = found_in(outcome, have_met=have_met)
-        if found is None:
-            return ()
-        message = message_of(self._mapper.robot, outcome.comparison, found)
-        final = self._comparisons.is_final(outcome.comparison)
-        self._outbox.send_news(message, final=final)
-        self._needs.published(time.monotonic(), message)
-        self._whereabouts.met(message)
-        self._state.keep_found(self._mapper.boot, self._outbox.found)
-        return found
-
     def _publish_map(self) -> None:
-        self._changed = False
-        self._published = self._draw()
-        arrives, size = self._outbox.send_map(self._published, complete=False)
-        self._tell(self._published)
-        self._keep(self._published)
-        self._comparisons.own_map(arrives, finished=self._finished)
+        self._changed = self._unkept = False
+        self._map.publish()
+        arrives, size = self._outbox.send_map(self._map.told, complete=False)
+        self._tell(self._map.whole)
+        self._keep(self._map.told)
+        compared = arrives if self._map.known is None else self._map.known
+        self._comparisons.own_map(compared, finished=self._finished)
+        self._findings.tell_place(self._map.told)
         now = time.monotonic()
         self._publication.published(now, size)
         self._needs.published(now)
-
-    def _draw(self) -> RobotMap:
-        """Return the map as it is now; what changes while it is drawn is still to be kept."""
-        self._unkept = False
-        with self._mapping:
-            snapshot = self._mapper.snapshot()
-        return numbered_from(without_strays(snapshot.robot_map()), self._first)
 
     def _keep(self, robot_map: RobotMap) -> None:
         self._state.keep(robot_map)
         self._keeping.done(time.monotonic())
 
-    @property
-    def _state_published(self) -> MapVersion | None:
-        """Which state of the map was published last, None while there is nothing in it."""
-        return MapVersion.of(self._published) if self._published.submaps else None
-
     def _publish_marks(self) -> None:
-        message = self._marks.message()
+        message = self._map.marks.message()
         self._outbox.send_marks(message)
         self._state.keep_marks(message)
 
     def _publish_status(self) -> None:
         self._outbox.send_status(self._status())
         self._statuses.sent(time.monotonic(), self._state_told)
-
-    @property
-    def _scans_placed(self) -> int:
-        """How many scans of this run are in the map, as published last."""
-        return max(0, _scans_placed(self._published) - self._placed_before)
 
     def _status(self) -> StatusMessage:
         return StatusMessage(
@@ -377,13 +332,13 @@ class AgentRun:
             stamp=time.time(),
             state="finished" if self._finished else "mapping",
             scans_seen=self._scans_seen,
-            scans_placed=self._scans_placed,
+            scans_placed=self._map.scans_placed,
             scans_total=self._total,
             scans_skipped=0 if self._live is None else self._live.skipped,
             scan_age=None if self._live is None else self._live.oldest(),
-            components=len(self._published.components),
-            submaps=len(self._published.submaps),
-            map_version=self._published.version,
+            components=len(self._map.told.components),
+            submaps=len(self._map.told.submaps),
+            map_version=self._map.told.version,
             compared=dict(self._comparisons.published),
             holds=self._comparisons.held,
             sent=dict(self._outbox.sent),
@@ -391,7 +346,3 @@ class AgentRun:
             dropped=self._inbox.dropped,
             orders=self._orders.digest,
         )
-
-
-def _scans_placed(robot_map: RobotMap) -> int:
-    return sum(len(submap.trajectory.scan_index) for submap in robot_map.submaps)

@@ -80,6 +80,7 @@ class ComparisonSchedule:
         self._parameters = parameters
         self._own: RobotMap | None = None
         self._own_finished = False
+        self._alone = False  # whether nobody else has our map
         self._earlier: dict[str, RobotMap] = {}  # this robot's runs before, by boot
         self._team = TeamMaps()
         self._joined = JoinedRuns()
@@ -95,6 +96,11 @@ class ComparisonSchedule:
         self._own_finished = finished
         self._encounters.take(robot_map)
         self._wake()
+
+    def follow_in(self, known: RobotMap) -> None:
+        """Compare a stored `known` map in place of this robot's own; nobody else can."""
+        self._alone = True
+        self.own_map(known, finished=False)
 
     def earlier_map(self, robot_map: RobotMap) -> None:
         """Take in the map of a run of this robot before this one: it is compared as a peer's."""
@@ -214,8 +220,16 @@ class ComparisonSchedule:
         """By peer, the versions we compared last of this run and the peer's newest."""
         if self._own is None:
             return {}
-        pairs = {m.robot: self._pairs.get(_key(self._own, m)) for m in self._team.newest}
-        return {name: p.published for name, p in pairs.items() if p and p.published}
+        return {m.robot: told for m in self._team.newest if (told := self._told(self._own, m))}
+
+    def _told(self, own: RobotMap, other: RobotMap) -> Compared | None:
+        """Return which versions of two maps we compared last, or need not compare."""
+        if _is_path(other):
+            return Compared(
+                own_version=own.version, peer_boot=other.boot, peer_version=other.version
+            )
+        pair = self._pairs.get(_key(own, other))
+        return None if pair is None else pair.published
 
     @property
     def held(self) -> tuple[MapVersion, ...]:
@@ -246,6 +260,8 @@ class ComparisonSchedule:
         for ours, other in [*combinations(own, 2), *((a, b) for a in own for b in others)]:
             if not self._outdated(ours, other) or not self._duty(ours, other):
                 continue
+            if _is_path(ours) or _is_path(other):
+                continue
             if every or self._likely(ours, other):
                 yield ours, other
 
@@ -259,7 +275,7 @@ class ComparisonSchedule:
         """Tell whether it is for us to compare two maps."""
         if self._is_over(own, other) and self._joined.tells(own, other):
             return False
-        if own is not self._own or other.boot in self._earlier:
+        if own is not self._own or other.boot in self._earlier or self._alone:
             return True  # runs of ours that are over are nobody else's business
         gone = self._team.is_gone(other.robot)
         if other.robot == self._robot:
@@ -306,6 +322,12 @@ class ComparisonSchedule:
 
     def _wake(self) -> None:
         self._quiet_until = -math.inf
+
+
+def _is_path(robot_map: RobotMap) -> bool:
+    """Tell whether a map is a path without walls: of a robot that follows in a stored map."""
+    driven = any(len(submap.trajectory.pose) for submap in robot_map.submaps)
+    return driven and not any(len(submap.map.segments) for submap in robot_map.submaps)
 
 
 def _key(one: RobotMap | MapVersion, another: RobotMap | MapVersion) -> PairOfRuns:

@@ -145,6 +145,10 @@ class Mapper:
         self.seen: Observation | None = None  # the last scan taken, as it was observed
         self._is_finished = False
 
+    @property
+    def followed(self) -> None:
+        """None: all that it has is of the robot's making, the map that it goes on from too."""
+
     def add(self, scan: Scan) -> Placement:
         """Take the next scan.
 

@@ -29,6 +29,10 @@ class ScanMapper(Protocol):
     def boot(self) -> str:
         """Which run of it this is."""
 
+    @property
+    def followed(self) -> RobotMap | None:
+        """The stored map in which it only follows the robot: of others' making; None if it maps."""
+
     def add(self, scan: Scan) -> Placement:
         """Take the next scan."""
 

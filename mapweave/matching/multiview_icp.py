@@ -36,6 +36,9 @@ class MultiviewIcpParameters(StageParameters):
     )
     step_sigma: float = Field(0.05, gt=0, description="[m] of a tracked step between two scans")
     turn_sigma: float = Field(0.02, gt=0, description="[rad] the same for its turn")
+    step_doubt: float = Field(
+        1.5, gt=0, description="times these sigmas by which a step is off that counts a quarter"
+    )
     start_sigma: float = Field(0.03, gt=0, description="[m] of the first scan")
     start_turn: float = Field(0.01, gt=0, description="[rad] of the first scan")
 
@@ -62,7 +65,7 @@ def refine(
     moving = join_points(thinned)
     owner = np.repeat(np.arange(len(poses)), [len(s) for s in thinned])
     tracked = np.array(poses, dtype=float)
-    held, refined = _tracking(len(tracked), p), tracked.copy()
+    refined = tracked.copy()
     for scale in p.scales:
         matrix, pull = normal_equations(
             moving.points,
@@ -77,6 +80,7 @@ def refine(
         )
         off = refined - tracked
         off[:, 2] = se2.wrap(off[:, 2])
+        held = _tracking(off, p)
         # A Gauss-Newton step; tracking pulls each pose back to where it put it.
         right = pull / p.noise**2 + held @ off.ravel()
         step = solve_positive(matrix / p.noise**2 + held, -right)
@@ -85,16 +89,21 @@ def refine(
     return refined
 
 
-def _tracking(n: int, p: MultiviewIcpParameters) -> FloatArray:
+def _tracking(off: FloatArray, p: MultiviewIcpParameters) -> FloatArray:
     """(3n, 3n) normal matrix of the n - 1 tracked steps and of the first pose.
 
-    Of small corrections in the common frame: neighbours move and turn alike.
+    Of small corrections in the common frame: neighbours move and turn alike. Tracking may have put
+    a scan into another minimum, beside the true one: the farther off a step is by what the other
+    scans say, the less it counts, as a pair of points does. The (n, 3) `off` is how far the poses
+    are from where tracking put them [m, m, rad].
     """
-    sigmas = np.tile([p.step_sigma, p.step_sigma, p.turn_sigma], (n, 1))
+    sigmas = np.tile([p.step_sigma, p.step_sigma, p.turn_sigma], (len(off), 1))
     sigmas[0] = [p.start_sigma, p.start_sigma, p.start_turn]
-    held = sigmas.ravel() ** -2
+    wrong = np.diff(off, axis=0, prepend=off[:1]) / sigmas  # the first pose is held as it is
+    weight = (1 + (wrong**2).sum(axis=1) / p.step_doubt**2) ** -2
+    held = (weight[:, None] * sigmas**-2).ravel()
     matrix = np.diag(held)
-    later = np.arange(3, 3 * n)
+    later = np.arange(3, 3 * len(off))
     matrix[later - 3, later - 3] += held[3:]
     matrix[later - 3, later] = matrix[later, later - 3] = -held[3:]
     return matrix

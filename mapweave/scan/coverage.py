@@ -28,7 +28,11 @@ class CoverageParameters(StageParameters):
         description="[m] from a wall within which free space ends because of it: what is kept from"
         " walls, by what outlines are simplified, and a cell",
     )
-    min_length: float = Field(0.5, gt=0, description="[m] narrower is no way on for a robot")
+    min_width: float = Field(
+        0.8,
+        gt=0,
+        description="[m] of an opening from wall to wall, as a narrow door: less is no way on",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,10 +89,15 @@ def coverage(lines: LineMap, parameters: CoverageParameters | None = None) -> Co
     edges = _edges(free)
     open_ends = _chains(edges, _away_from(lines.segments, edges.segments, p.reach))
     merged = shapely.get_parts(shapely.line_merge(shapely.MultiLineString(open_ends)))
-    parts = [part for part in merged if part.length >= p.min_length]
+    parts = [part for part in merged if _width(part, p.reach) >= p.min_width]
     parts.sort(key=lambda part: -part.length)
     frontiers = tuple(np.array(part.coords, dtype=np.float64) for part in parts)
     return Coverage(float(free.area), frontiers)
+
+
+def _width(part: shapely.LineString, reach: float) -> float:
+    """[m] of the opening in which a frontier is: to the walls by which both its ends are."""
+    return float(part.length if part.is_closed else part.length + 2 * reach)
 
 
 def _edges(free: BaseGeometry) -> _Edges:

@@ -206,9 +206,9 @@ def from_rings(outlines: Iterable[FloatArray]) -> BaseGeometry:
     polygons = [Polygon(ring) for ring in outlines if len(ring) >= 3]
     if not polygons:
         return Polygon()
-    # No lines, into which an outline that runs back on itself would fall: they are no area.
-    areas = shapely.make_valid(polygons, method="structure", keep_collapsed=False)
-    return shapely.union_all(areas)
+    # By its lines: the structure of an outline that runs back along itself is told by rounding.
+    parts = shapely.get_parts(shapely.get_parts(shapely.make_valid(polygons)))
+    return shapely.union_all(parts[shapely.get_dimensions(parts) == 2])  # a line is no area
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:

@@ -451,3 +451,24 @@ def plan_among_strangers(strangers: int = 2) -> tuple[ComparisonSchedule, str, s
         plan.peer_here(peer, "x")
         plan.peer_map(seen_by(peer, lines))
     return plan, likely, unlikely
+
+
+def test_who_follows_in_a_stored_map_compares_it_with_all_as_nobody_else_has_it() -> None:
+    for peer in (FIRST, SECOND):
+        robot = SECOND if peer == FIRST else FIRST
+        plan = ComparisonSchedule(robot, PARAMETERS)
+        plan.follow_in(a_map(robot, 0))
+        plan.peer_here(peer, "x")
+        plan.peer_map(a_map(peer, 1))
+        assert plan.begin(0.0) is not None
+
+
+def test_the_path_of_one_that_follows_in_a_stored_map_is_compared_by_nobody() -> None:
+    driven = Trajectory(np.arange(3), np.zeros(3), np.zeros((3, 3)))
+    path = Submap(1, 0, np.zeros(3), LineMap.empty(), driven)
+    plan = plan_of(FIRST, SECOND)
+    plan.peer_map(RobotMap(SECOND, "x", 7, (path,)))
+    assert plan.begin(1e9) is None
+    assert plan.idle
+    # Who waits until all is compared waits for none of this.
+    assert plan.published[SECOND] == Compared(own_version=1, peer_boot="x", peer_version=7)

@@ -6,6 +6,7 @@ again and again, about where the robot is believed to be, so that no drift adds 
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import groupby
 from typing import NamedTuple
 
@@ -145,6 +146,12 @@ class Localizer:
         return self._mapper.boot
 
     @property
+    def followed(self) -> RobotMap:
+        """The known map, under this robot's name; the first submaps of `robot_map` are its."""
+        known = self._known
+        return RobotMap(self.robot, self.boot, 0, known.submaps, self._made_with, known.marks)
+
+    @property
     def place(self) -> Place | None:
         """Where the tracker's frame is in the known map; None where the robot is not located."""
         return self._place
@@ -179,20 +186,13 @@ class Localizer:
 
     def robot_map(self) -> RobotMap:
         """Return the known map, and the path in it so far."""
-        submaps = [*self._known.submaps]
+        known, submaps = self.followed, [*self._known.submaps]
         length = self.parameters.mapper.backend.submap.max_scans
         for component, steps in groupby(self._path, lambda each: each.component):
             located = [each.step for each in steps]
             for k in range(0, len(located), length):
                 submaps.append(_path(len(submaps), component, located[k : k + length]))
-        return RobotMap(
-            self.robot,
-            self.boot,
-            len(self._path),
-            tuple(submaps),
-            self._made_with,
-            self._known.marks,
-        )
+        return replace(known, version=len(self._path), submaps=tuple(submaps))
 
     def snapshot(self) -> "LocalizedMap":
         """Return what `robot_map` would return now: it is drawn in a moment."""

@@ -7,7 +7,8 @@ from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import Field, ModelWrapValidatorHandler, model_validator
+from pydantic import Field, model_validator
+from pydantic.functional_validators import ModelWrapValidatorHandler  # 2.7 has it here only
 
 from mapweave.evidence import Evidence, RunnerUp
 from mapweave.maps import Alignment, Decision, RobotMap, SharedPlace, parse_component

@@ -81,6 +81,18 @@ def test_a_single_scan_without_walls_stays(seen: list[OrientedPoints], true: Flo
     np.testing.assert_allclose(refine(seen[:1], true[:1], NOTHING), true[:1], atol=1e-9)
 
 
+def test_a_scan_that_tracking_put_beside_its_place_is_moved_to_where_the_others_have_it(
+    seen: list[OrientedPoints], true: FloatArray
+) -> None:
+    """A step off by three sigmas, as one into another minimum, is not held against all that see."""
+    for k in (4, 8, 12):
+        off = true.copy()
+        off[k] += [0.1, -0.1, 0.06]
+        found = refine(seen, off, NOTHING)
+        assert errors(true, found)[k] < 0.02
+        assert abs(se2.between(true[0], true[k])[2] - se2.between(found[0], found[k])[2]) < 0.004
+
+
 def test_along_a_bare_corridor_the_tracked_steps_are_kept() -> None:
     """Its walls say nothing of how far along it the scans were; only tracking does."""
     corridor = line_map(np.array([[-40.0, -1, 40, -1], [40, 1, -40, 1]]), ())

@@ -46,6 +46,30 @@ def test_a_door_that_nobody_went_through_is_the_one_frontier() -> None:
     assert 0.5 <= length(frontier) <= 1.2
 
 
+@pytest.mark.parametrize("door", [0.85, 1.0])
+def test_a_door_of_the_usual_width_is_one_as_well(door: float) -> None:
+    (frontier,) = coverage(room(door=door)).frontiers
+    assert frontier[:, 1].mean() == pytest.approx(2.0)
+
+
+def test_what_stands_in_a_room_and_is_too_small_for_walls_is_no_way_on() -> None:
+    """A hole in free space, of which nothing was made but returns."""
+    outside = [[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]]
+    for size, ways in ((0.15, 0), (0.5, 1)):
+        low, high = 2.0, 2.0 + size
+        halves = [
+            [*outside[:2], [6.0, high], [high, high], [high, low], [low, low], [0.0, low]],
+            [[0.0, low], [low, low], [low, high], [6.0, high], *outside[2:]],
+        ]
+        walls = [
+            [0.0, 0.0, 6.0, 0.0],
+            [6.0, 0.0, 6.0, 4.0],
+            [6.0, 4.0, 0.0, 4.0],
+            [0.0, 4.0, 0.0, 0.0],
+        ]
+        assert len(coverage(line_map(walls, *halves)).frontiers) == ways
+
+
 def test_a_gap_that_is_too_narrow_for_a_robot_is_none() -> None:
     assert coverage(room(door=0.4)).frontiers == ()
 
@@ -88,7 +112,7 @@ def test_frontiers_are_what_is_left_beyond_the_reach_of_all_walls() -> None:
         walls = np.hstack([starts, starts + random.normal(0, 1.5, (12, 2))])
         angle = np.sort(random.uniform(0, 2 * np.pi, 7))
         ring = 5 + 4 * np.column_stack([np.cos(angle), np.sin(angle)])
-        every = CoverageParameters(min_length=1e-3)
+        every = CoverageParameters(min_width=1e-3)
         found = coverage(line_map(walls.tolist(), ring.tolist()), every)
         lines = shapely.linestrings(walls.reshape(-1, 2, 2))
         wide = shapely.union_all(shapely.buffer(lines, every.reach, quad_segs=200))

@@ -143,3 +143,17 @@ def test_a_doubled_end_beam_of_a_full_turn_changes_no_free_space() -> None:
     assert doubled.area == pytest.approx(np.pi * (2.85**2 + 0.5), rel=0.06)
     seam = LineString([[-0.2, 0], [-1.6, 0]])  # where the turn begins and ends
     assert doubled.contains(seam) and single.contains(seam)
+
+
+def test_an_outline_that_runs_back_along_itself_is_an_area_however_it_is_turned(
+    rng: Generator,
+) -> None:
+    bottom = [[0, 0], [1.7, 0], [1.7, -0.1], [1.85, -0.1], [1.85, 0], [5.41, 0], [5.44, -0.125]]
+    back = [[1.2, -0.125], [1.25, -0.1], [1.25, 0], [1.05, 0], [1, -0.125], [0.01, -0.125]]
+    outline = np.array([*bottom, *back])
+    area = from_rings([outline]).area
+    for _ in range(500):
+        pose = random_pose(rng)
+        turned, beside = (se2.transform_points(pose, part) for part in (outline, outline + 0.05))
+        assert from_rings([turned]).area == pytest.approx(area)
+        assert area < from_rings([turned, beside]).area < 2 * area

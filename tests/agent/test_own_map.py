@@ -1,9 +1,13 @@
-"""Scans that fit nothing: who hears of them."""
+"""The map of a run as others get it: without stray scans, and without what others made."""
 
 import numpy as np
 
+from mapweave.mapping.localization.known_map import KnownMap
+from mapweave.mapping.localization.localizer import Localizer
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
-from mapweave_agent.single_scan_filter import without_strays
+from mapweave.marks import Anchor, Mark
+from mapweave_agent.own_map import OwnMap, without_strays
+from tests.mapweave.buildings import BUILDING, part
 
 
 def robot_map(*submaps: tuple[int, int]) -> RobotMap:
@@ -49,3 +53,16 @@ def test_the_first_scan_of_all_stays_while_there_is_no_other() -> None:
 
 def test_a_map_of_nothing_is_one_of_nothing() -> None:
     assert ids(robot_map()) == []
+
+
+def test_a_stored_map_that_is_followed_is_kept_and_its_walls_and_marks_are_told_to_nobody() -> None:
+    walls = part(BUILDING, 0.0, 10.0)
+    mark = Mark("m1", "victim", "anna", 5.0, Anchor(0, None), np.zeros(2))
+    known = KnownMap((Submap(0, 0, np.zeros(3), walls, Trajectory.empty()),), (mark,))
+    own = OwnMap(Localizer(known, "b"), first=3)
+    own.publish()
+    assert own.whole.components == [3]
+    assert own.whole.marks == (mark,)
+    assert own.told.submaps == ()
+    assert own.told.marks == own.marks.all == ()
+    assert own.state is None
