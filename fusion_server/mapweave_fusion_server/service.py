@@ -91,7 +91,7 @@ class Service:
         self._speaking = StatusSchedule(COORDINATOR_INTERVAL, LEAST_STATUS_INTERVAL)
         self._report_due = self._look_due = 0.0
         self._latest: JointStatusMessage | None = None
-        self._builder = VersionBuilder(store.series, config or Config())
+        self._builder = VersionBuilder(store.series, config or Config(), self._inbox.wake)
         self._covers = 0
         self._started = time.time()
         self._feed = feed or Feed()
@@ -151,14 +151,15 @@ class Service:
         if self._builder.is_busy:
             self._conclude()
         if self._coordinator.has_news:
-            self._begin()
+            self._begin(patient=True)
             self._conclude()
         if self._intake.refused:
             _log.warning("%d messages were not valid and dropped", self._intake.refused)
 
-    def _begin(self) -> None:
+    def _begin(self, *, patient: bool = False) -> None:
         self._covers = self._store.news
-        self._builder.start(self._coordinator.begin(time.monotonic()), time.time())
+        draft = self._coordinator.begin(time.monotonic())
+        self._builder.start(draft, time.time(), patient=patient)
 
     def _conclude(self) -> None:
         built = self._builder.take()
@@ -171,7 +172,8 @@ class Service:
             self._speaking.hurry()  # robots wait for their new frames
             self._feed.show_version(built.draft.version, built.draft.maps, kept.message)
             record(self._story.joined(built.joint))
-        self._coordinator.finish(built.joint if built else None)
+        has_more = built is not None and built.has_more
+        self._coordinator.finish(built.joint if built else None, has_more=has_more)
 
     def _keep(self, built: Built) -> Built:
         """Store a version; return it, as one of another series where there is no room."""
