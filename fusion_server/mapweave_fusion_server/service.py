@@ -135,6 +135,7 @@ class Service:
             self._speaking.met(now)
         if now >= self._look_due:
             self._look_due = now + POLL
+            self._intake.look(now, linked=bool(self._session.info.routers_zid()))
             self._say_how_it_is(now)
 
     def _take_orders_of_page(self) -> None:
