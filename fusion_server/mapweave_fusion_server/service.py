@@ -16,6 +16,7 @@ from mapweave_fusion_server.builder import Built, VersionBuilder
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
+from mapweave_fusion_server.memory import GIVEN_BACK, give_back
 from mapweave_fusion_server.storage.database import UnwritableError
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
@@ -89,7 +90,7 @@ class Service:
         self._joints = JointSender()
         self._boot = keys.new_boot()
         self._speaking = StatusSchedule(COORDINATOR_INTERVAL, LEAST_STATUS_INTERVAL)
-        self._report_due = self._look_due = 0.0
+        self._report_due = self._look_due = self._give_back_due = 0.0
         self._latest: JointStatusMessage | None = None
         self._builder = VersionBuilder(store.series, config or Config(), self._inbox.wake)
         self._covers = 0
@@ -213,6 +214,9 @@ class Service:
             self._report_due = now + REPORT_INTERVAL
             self._resume_storing()
             self._report(status)
+        if now >= self._give_back_due:
+            self._give_back_due = now + GIVEN_BACK
+            give_back()
 
     def _status(self) -> JointStatusMessage:
         return JointStatusMessage(
