@@ -173,11 +173,11 @@ def test_what_is_not_compared_at_once_is_compared_the_next_time(frames: FloatArr
     """A coordinator that starts anew makes a version all the same."""
     cluster, robots, alignments = team(BENT, frames)
     weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=5))
-    before = []
+    before: list[float] = []
     while not before or weaver.has_more:
         weaver.turn()
         woven, poses = weaver.weave(cluster, robots, alignments)
-        before.append(apart(woven, bent(robots, poses)).max())
+        before.append(float(apart(woven, bent(robots, poses)).max()))
     assert len(before) > 2
     assert before[0] > before[-1]
     assert before[-1] < 0.1
