@@ -1,8 +1,9 @@
 """Builds versions in a thread of its own, so that receiving goes on meanwhile."""
 
 import logging
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 
 from mapweave.config import Config
@@ -32,6 +33,8 @@ class Built:
         The joint map.
     message, payload
         What says it, and as it travels when it travels whole.
+    has_more
+        Whether submaps wait to be compared for the next version.
     """
 
     draft: Draft
@@ -39,6 +42,7 @@ class Built:
     joint: JointMap
     message: JointMapMessage
     payload: bytes
+    has_more: bool
 
 
 class VersionBuilder:
@@ -50,6 +54,8 @@ class VersionBuilder:
         Names the numbering, for the message.
     config
         The effective configuration.
+    ready
+        Called in the builder's thread when there is something to take.
 
     Attributes
     ----------
@@ -57,8 +63,11 @@ class VersionBuilder:
         May be set while nothing is being built.
     """
 
-    def __init__(self, series: str, config: Config) -> None:
+    def __init__(
+        self, series: str, config: Config, ready: Callable[[], object] = lambda: None
+    ) -> None:
         self.series = series
+        self._ready = ready
         # The worker's alone.
         self._builder = JointMapBuilder(
             JointParameters.of(config), JointOptimizationParameters.of(config)
@@ -88,9 +97,13 @@ class VersionBuilder:
         """Whether `take` returns at once."""
         return self._future is not None and self._future.done()
 
-    def start(self, draft: Draft, begun: float) -> None:
-        """Start building `draft`, made of all that was known at `begun` [s since 1970]."""
-        self._future = self._worker.submit(self._build, draft, begun)
+    def start(self, draft: Draft, begun: float, *, patient: bool = False) -> None:
+        """Start building `draft`, made of all that was known at `begun` [s since 1970].
+
+        If it is `patient` nothing waits for the next version, however long this one takes.
+        """
+        self._future = self._worker.submit(self._build, draft, begun, patient)
+        self._future.add_done_callback(lambda _: self._ready())
 
     def take(self) -> Built | None:
         """Return the version that was started, when it is done; None when it could not be built.
@@ -109,11 +122,13 @@ class VersionBuilder:
 
     def in_series(self, built: Built) -> Built:
         """Return a version as one of the series that is set now."""
-        return self._packed(built.draft, built.begun, built.joint)
+        message, payload = self._packed(built.joint)
+        return replace(built, message=message, payload=payload)
 
-    def _build(self, draft: Draft, begun: float) -> Built:
-        return self._packed(draft, begun, draft.build(self._builder))
+    def _build(self, draft: Draft, begun: float, patient: bool) -> Built:
+        joint = draft.build(self._builder, patient=patient)
+        return Built(draft, begun, joint, *self._packed(joint), self._builder.has_more)
 
-    def _packed(self, draft: Draft, begun: float, joint: JointMap) -> Built:
+    def _packed(self, joint: JointMap) -> tuple[JointMapMessage, bytes]:
         message = JointMapMessage.pack(joint, self.series, self._packer)
-        return Built(draft, begun, joint, message, encode(message))
+        return message, encode(message)

@@ -266,8 +266,12 @@ class Coordinator:
         self._begun, self._urgency = now, Urgency.NONE
         return self._draft
 
-    def finish(self, joint: JointMap | None) -> None:
-        """End the draft that became `joint`; None, when it could not be built, keeps its number."""
+    def finish(self, joint: JointMap | None, *, has_more: bool = False) -> None:
+        """End the draft that became `joint`; None, when it could not be built, keeps its number.
+
+        Where what is known `has_more` in it than was made of it, another version follows.
+        """
+        self._raise_urgency(Urgency.SOON if has_more else Urgency.NONE)
         if joint is not None:
             self._version, self._judged = joint.version, joint.alignments
             self._is_last_known = True

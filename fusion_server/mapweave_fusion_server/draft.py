@@ -39,13 +39,16 @@ class Draft:
     before: tuple[Alignment, ...] = ()
     orders: tuple[Order, ...] = ()
 
-    def build(self, builder: JointMapBuilder) -> JointMap:
+    def build(self, builder: JointMapBuilder, *, patient: bool = False) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
 
         Parameters
         ----------
         builder
             Keeps what it made for the versions before.
+        patient
+            Whether nothing may wait for the next version.
         """
-        joint = builder.build(self.maps, self.alignments, self.version, self.orders)
+        known = self.maps, self.alignments, self.version, self.orders
+        joint = builder.build(*known, patient=patient)
         return mark_revoked(joint, self.before)

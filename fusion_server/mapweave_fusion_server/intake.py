@@ -29,6 +29,7 @@ from mapweave_protocol.link.inbox import (
     status_reader,
 )
 from mapweave_protocol.link.lacking import Lacking
+from mapweave_protocol.narration.attendance import Attendance
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import decode, encode
 from mapweave_protocol.wire.messages import (
@@ -97,12 +98,25 @@ class Intake:
         self._clashing: set[str] = set()
         self._too_large: set[str] = set()
         self._warned_of_orders = False
+        self._attendance = Attendance(None, story)
+        self._looked = 0.0  # [s] by the clock of `look`
         self._met = False
 
     def met(self) -> bool:
         """Tell whether a robot or another coordinator came since this was asked the last time."""
         met, self._met = self._met, False
         return met
+
+    def look(self, now: float, *, linked: bool) -> None:
+        """Tell who has been gone for a while, at `now` [s], and whether that can be known.
+
+        Parameters
+        ----------
+        linked
+            Whether a router is connected: where our own link is away, nobody else need be.
+        """
+        self._looked = now
+        record(self._attendance.look(now, linked=linked))
 
     @property
     def refused(self) -> int:
@@ -171,8 +185,7 @@ class Intake:
         elif (presence := read_presence(arrival, self.refusals)) is not None:
             self._note(presence.robot)
             self._met |= presence.here
-            change = self._story.appeared if presence.here else self._story.left
-            record(change(presence.robot, presence.boot))
+            record(self._attendance.robot(presence, self._looked))
 
     def _takes_what_was_said(self, arrival: Arrival, received: float) -> bool:
         """Take marks and orders; return whether `arrival` was any."""

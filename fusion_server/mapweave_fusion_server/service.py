@@ -16,6 +16,7 @@ from mapweave_fusion_server.builder import Built, VersionBuilder
 from mapweave_fusion_server.coordinator import Coordinator, CoordinatorParameters
 from mapweave_fusion_server.intake import Intake, last_version
 from mapweave_fusion_server.journal import record
+from mapweave_fusion_server.memory import GIVEN_BACK, give_back
 from mapweave_fusion_server.storage.database import UnwritableError
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import CoordinatorReport, Feed
@@ -89,9 +90,9 @@ class Service:
         self._joints = JointSender()
         self._boot = keys.new_boot()
         self._speaking = StatusSchedule(COORDINATOR_INTERVAL, LEAST_STATUS_INTERVAL)
-        self._report_due = self._look_due = 0.0
+        self._report_due = self._look_due = self._give_back_due = 0.0
         self._latest: JointStatusMessage | None = None
-        self._builder = VersionBuilder(store.series, config or Config())
+        self._builder = VersionBuilder(store.series, config or Config(), self._inbox.wake)
         self._covers = 0
         self._started = time.time()
         self._feed = feed or Feed()
@@ -135,6 +136,7 @@ class Service:
             self._speaking.met(now)
         if now >= self._look_due:
             self._look_due = now + POLL
+            self._intake.look(now, linked=bool(self._session.info.routers_zid()))
             self._say_how_it_is(now)
 
     def _take_orders_of_page(self) -> None:
@@ -151,14 +153,15 @@ class Service:
         if self._builder.is_busy:
             self._conclude()
         if self._coordinator.has_news:
-            self._begin()
+            self._begin(patient=True)
             self._conclude()
         if self._intake.refused:
             _log.warning("%d messages were not valid and dropped", self._intake.refused)
 
-    def _begin(self) -> None:
+    def _begin(self, *, patient: bool = False) -> None:
         self._covers = self._store.news
-        self._builder.start(self._coordinator.begin(time.monotonic()), time.time())
+        draft = self._coordinator.begin(time.monotonic())
+        self._builder.start(draft, time.time(), patient=patient)
 
     def _conclude(self) -> None:
         built = self._builder.take()
@@ -171,7 +174,8 @@ class Service:
             self._speaking.hurry()  # robots wait for their new frames
             self._feed.show_version(built.draft.version, built.draft.maps, kept.message)
             record(self._story.joined(built.joint))
-        self._coordinator.finish(built.joint if built else None)
+        has_more = built is not None and built.has_more
+        self._coordinator.finish(built.joint if built else None, has_more=has_more)
 
     def _keep(self, built: Built) -> Built:
         """Store a version; return it, as one of another series where there is no room."""
@@ -210,6 +214,9 @@ class Service:
             self._report_due = now + REPORT_INTERVAL
             self._resume_storing()
             self._report(status)
+        if now >= self._give_back_due:
+            self._give_back_due = now + GIVEN_BACK
+            give_back()
 
     def _status(self) -> JointStatusMessage:
         return JointStatusMessage(

@@ -53,18 +53,32 @@ class JointMapBuilder:
         self._verdicts: KnownVerdicts = Recent()
         self._kept = Kept()
 
+    @property
+    def has_more(self) -> bool:
+        """Whether the last version left submaps uncompared: one more of the same would fit them."""
+        return self._weaver.has_more
+
     def build(
         self,
         maps: Sequence[RobotMap],
         alignments: Sequence[Alignment],
         version: int,
         orders: Sequence[Order] = (),
+        *,
+        patient: bool = False,
     ) -> JointMap:
         """Return what the team knows, its robots' submaps woven together.
 
         Alignments that contradict others, or what robots saw, are set aside: they stay in the joint
         map as ambiguous, the reason saying so. What operators ordered goes before.
+
+        Parameters
+        ----------
+        patient
+            Whether all submaps are compared that are to be, however long that takes; if not, some
+            of many wait for the next version.
         """
+        self._weaver.turn(patient=patient)
         for kept in (self._wholes, self._witnesses, self._verdicts, self._kept):
             kept.turn()
         submaps = submaps_by_component(maps)

@@ -61,8 +61,10 @@ def fuse(
     alignments = as_list("alignments", alignments, Alignment)
     _check_components(maps, alignments)
     # Nothing grows any more, and there is no next time.
-    weaving = JointOptimizationParameters.of(config, newest=True, at_once=1_000_000)
-    joint = JointMapBuilder(JointParameters.of(config), weaving).build(maps, alignments, 1)
+    builder = JointMapBuilder(
+        JointParameters.of(config), JointOptimizationParameters.of(config, newest=True)
+    )
+    joint = builder.build(maps, alignments, 1, patient=True)
     return replace(joint, made_with=MadeWith.of(config))
 
 

@@ -50,7 +50,10 @@ class JointOptimizationParameters(StageParameters):
         " team it grows with every message, and goes along with the one before",
     )
     at_once: int = Field(
-        200, ge=1, description="new comparisons, some seconds; what is left is compared next time"
+        40,
+        ge=1,
+        description="new comparisons for a version, a part of a second; more wait for the next one,"
+        " and the maps that have come do not",
     )
     remembered: int = Field(20_000, ge=1, description="comparisons, the last")
 
@@ -82,12 +85,26 @@ class _Compared(NamedTuple):
 
 
 class JointOptimizer:
-    """Remembers what it compared: a finished submap never changes."""
+    """Remembers what it compared: a finished submap never changes.
+
+    Attributes
+    ----------
+    has_more
+        Whether comparisons wait for the next turn; once all are made, submaps lie where they would
+        if these had been made at once.
+    """
 
     def __init__(self, parameters: JointOptimizationParameters | None = None) -> None:
         self._p = parameters or JointOptimizationParameters()
         self._loops = LoopCloser(self._p.loops)
-        self._known: dict[_Compared, Constraint | None] = {}
+        self._known: dict[_Compared, Constraint | None] = {}  # what was asked for last comes last
+        self.turn()
+
+    def turn(self, *, patient: bool = False) -> None:
+        """Begin another version; one that is `patient` waits for all its comparisons."""
+        self._left: int | None = None if patient else self._p.at_once
+        self._asked = 0
+        self.has_more = False
 
     def weave(
         self,
@@ -168,25 +185,32 @@ class JointOptimizer:
     def _closures(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
         """Yield how submaps lie to each other that saw the same walls."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
-        left = self._p.at_once
         pairs = list(self._candidates(nodes))
         poses = np.array([n.submap.pose for n in nodes])
         older, newer = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
         between = np.round(se2.between(poses[older], poses[newer]) / steps).astype(np.int64)
         for (first, second), about in zip(pairs, between.tolist(), strict=True):
             asked = _Compared(nodes[first].submap.map, nodes[second].submap.map, *about)
-            if asked not in self._known and left > 0:
-                left -= 1
-                self._remember(asked)
-            link = self._known.get(asked)
+            link = self._link(asked)
             if link is not None:
                 yield replace(link, first=first, second=second)
 
-    def _remember(self, asked: _Compared) -> None:
-        """Compare, and forget the oldest comparison where there are too many."""
-        self._known[asked] = self._compared(asked)
-        if len(self._known) > self._p.remembered:
+    def _link(self, asked: _Compared) -> Constraint | None:
+        """Return what comparing comes to; None where it shows nothing, or has to wait."""
+        self._asked += 1
+        if asked in self._known:
+            link = self._known.pop(asked)
+        elif self._left == 0:
+            self.has_more = True
+            return None
+        else:
+            self._left = None if self._left is None else self._left - 1
+            link = self._compared(asked)
+        self._known[asked] = link
+        # Never what this version asks for: the next one would have to compare it again, for ever.
+        while len(self._known) > max(self._p.remembered, self._asked):
             del self._known[next(iter(self._known))]
+        return link
 
     def _candidates(self, nodes: Sequence[_Node]) -> Iterator[tuple[int, int]]:
         """Yield pairs of nodes near each other that tracking does not link."""

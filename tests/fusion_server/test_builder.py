@@ -1,6 +1,9 @@
 """Versions are built in a thread of their own, as the configuration says."""
 
+import threading
 import time
+
+import pytest
 
 from mapweave.config import Config, Mapping
 from mapweave.maps import JointMap
@@ -15,8 +18,9 @@ GIVEN: list[JointParameters] = []
 class Noting(Draft):
     """A draft that notes what it is built with."""
 
-    def build(self, builder: JointMapBuilder) -> JointMap:
+    def build(self, builder: JointMapBuilder, *, patient: bool = False) -> JointMap:
         """Return a map of nothing."""
+        assert not patient
         GIVEN.append(builder.parameters)
         return JointMap(self.version, (), ())
 
@@ -29,3 +33,23 @@ def test_a_version_is_built_with_what_the_configuration_says() -> None:
     assert built is not None
     assert built.joint.version == 1
     assert [JointParameters.of(config)] == GIVEN
+
+
+def test_a_version_that_is_ready_is_told_of_at_once() -> None:
+    told = threading.Event()
+    with VersionBuilder("series", Config(), told.set) as builder:
+        builder.start(Draft(1, (), ()), time.time())
+        assert told.wait(60.0)
+        assert builder.is_ready
+
+
+def test_a_version_says_whether_submaps_wait_for_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with VersionBuilder("series", Config()) as builder:
+        for waits in (True, False):
+            monkeypatch.setattr(JointMapBuilder, "has_more", waits)
+            builder.start(Draft(1, (), ()), time.time())
+            built = builder.take()
+            assert built is not None
+            assert built.has_more is waits

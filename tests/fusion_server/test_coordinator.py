@@ -157,6 +157,17 @@ def test_a_version_that_could_not_be_built_leaves_its_number_to_the_next(
     assert coordinator.begin(0.0).version == 1
 
 
+def test_another_version_follows_one_that_left_something_to_be_made(make_map: MakeMap) -> None:
+    coordinator = _coordinator(min_interval=2.0)
+    coordinator.receive_map(make_map("a"))
+    first = coordinator.begin(0.0)
+    coordinator.finish(JointMap(first.version, (), ()), has_more=True)
+    assert coordinator.is_pending
+    assert coordinator.seconds_until_due(0.5) == 1.5
+    assert _make_version(coordinator, now=2.0).version == 2
+    assert not coordinator.is_pending
+
+
 def test_numbering_goes_on_after_a_restart(make_map: MakeMap) -> None:
     coordinator = _coordinator(last_version=41)
     coordinator.receive_map(make_map("a"))

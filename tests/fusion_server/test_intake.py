@@ -13,10 +13,11 @@ from mapweave_fusion_server.intake import ASKED_AFTER, Intake
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.inbox import Arrival
+from mapweave_protocol.narration.attendance import GRACE
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.coding import entropy
-from mapweave_protocol.wire.keys import MAP, STATUS
+from mapweave_protocol.wire.keys import LIVE, MAP, STATUS
 from mapweave_protocol.wire.messages import StatusMessage
 
 SEGMENTS = 100
@@ -98,3 +99,38 @@ def test_a_robot_is_reported_with_the_map_of_the_run_that_said_its_status(tmp_pa
         intake.take(_status(1, "third"), 0.0)
         [report] = intake.reports
         assert report.map_version is None
+
+
+def test_that_our_own_link_is_away_is_no_word_of_robots(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """All tokens go with the link, and come back with it."""
+    caplog.set_level(logging.INFO)
+    token = LIVE.build(team="t", robot="a", boot="first")
+    with Store(tmp_path / "store.sqlite", "t") as store:
+        intake = Intake(Coordinator(CoordinatorParameters()), store, Story())
+        intake.look(100.0, linked=True)
+        intake.take(Arrival(token, b""), 0.0)
+        intake.take(Arrival(token, b"", gone=True), 0.0)
+        for now in (100.1, 150.0, 200.0):
+            intake.look(now, linked=False)
+        intake.look(200.1, linked=True)
+        intake.take(Arrival(token, b""), 0.0)
+        intake.look(300.0, linked=True)
+        told = [record.getMessage() for record in caplog.records]
+        assert told[0] == "a is here"
+        assert not any("a is" in line for line in told[1:])
+        intake.take(Arrival(token, b"", gone=True), 0.0)
+        intake.look(300.0 + GRACE, linked=True)
+    assert caplog.records[-1].getMessage() == "a is gone"
+
+
+def test_tokens_of_runs_that_were_never_here_leave_nothing(tmp_path: Path) -> None:
+    with Store(tmp_path / "store.sqlite", "t") as store:
+        intake = Intake(Coordinator(CoordinatorParameters()), store, Story())
+        for number in range(1000):
+            token = LIVE.build(team="t", robot=f"a{number}", boot="first")
+            intake.take(Arrival(token, b"", gone=True), 0.0)
+        intake.look(GRACE, linked=True)
+        assert not any(report.runs for report in intake.reports)
+        assert len(intake.reports) == 0

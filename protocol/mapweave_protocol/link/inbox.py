@@ -104,6 +104,7 @@ class Inbox:
         self._served: tuple[str, float] | None = None  # whom, and when
         self._count = self._bytes = 0
         self._changed = threading.Condition()
+        self._is_woken = False
         self.dropped = 0
 
     def put(self, sample: zenoh.Sample) -> None:
@@ -128,14 +129,21 @@ class Inbox:
                 self._drop()
             self._changed.notify()
 
+    def wake(self) -> None:
+        """Let who waits for an arrival, or will do so next, go on without one; in any thread."""
+        with self._changed:
+            self._is_woken = True
+            self._changed.notify()
+
     def get(self, timeout: float) -> Arrival | None:
-        """Return the next arrival, None if there is none within `timeout` [s]."""
+        """Return the next arrival, None if there is none within `timeout` [s], or it is woken."""
         with self._changed:
             if self._served is not None:
                 sender, since = self._served
                 self._turns.took(sender, self._clock() - since)
                 self._served = None
-            self._changed.wait_for(lambda: self._queues, timeout)
+            self._changed.wait_for(lambda: self._queues or self._is_woken, timeout)
+            self._is_woken = False
             if not self._queues:
                 return None
             sender = self._turns.next_of(self._queues)

@@ -19,12 +19,12 @@ class Attendance:
     Parameters
     ----------
     team
-        The team's id.
+        The team's id; None where it is not to be told that nobody is here.
     story
         Told of the robots.
     """
 
-    def __init__(self, team: str, story: Story) -> None:
+    def __init__(self, team: str | None, story: Story) -> None:
         self._team = team
         self._story = story
         self._coordinator = CoordinatorStory()
@@ -33,7 +33,7 @@ class Attendance:
         self._began: float | None = None
         self._unlinked: float | None = None
         self._is_outage_told = False
-        self._met = False
+        self._met = team is None
 
     def robot(self, presence: Presence, now: float) -> Iterator[str]:
         """Take in that a run of a robot is here, or may be gone."""
@@ -76,7 +76,8 @@ class Attendance:
     def _take(self, robot: str | None, boot: str, now: float, *, here: bool) -> Iterator[str]:
         self._met = True
         if not here:
-            self._leaving.setdefault((robot, boot), now)
+            if robot is None or self._is_told(robot, boot):
+                self._leaving.setdefault((robot, boot), now)
             return
         self._leaving.pop((robot, boot), None)
         # Another run came in its place: it is gone, not here twice.
@@ -91,8 +92,13 @@ class Attendance:
         del self._leaving[robot, boot]
         if robot is None:
             yield from self._coordinator.left(boot)
-        else:
+        elif self._is_told(robot, boot):
             yield from self._story.left(robot, boot)
+
+    def _is_told(self, robot: str, boot: str) -> bool:
+        """Whether a run of a robot is here as far as it was told; of others it is no news."""
+        state = self._story.robots.get(robot)
+        return state is not None and boot in state.claimants.boots
 
     def _tell_link(self, now: float, *, linked: bool) -> Iterator[str]:
         if linked:

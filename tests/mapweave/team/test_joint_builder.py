@@ -83,6 +83,22 @@ def assert_same(one: JointMap, other: JointMap) -> None:
         np.testing.assert_array_equal(x.transform, y.transform)
 
 
+def test_versions_that_compare_a_few_submaps_each_come_to_what_a_patient_one_says(
+    rng: Generator,
+) -> None:
+    """What waited is made up for: in the end nothing tells that it came later."""
+    maps = [robot(name, rng) for name in NAMES]
+    alignments = [aligned(maps[0], other, rng) for other in maps[1:]]
+    few = JointOptimizationParameters(newest=True, at_once=3)
+    hasty, patient = JointMapBuilder(weaving=few), JointMapBuilder(weaving=few)
+    version = hasty.build(maps, alignments, 1)
+    assert hasty.has_more
+    while hasty.has_more:
+        version = hasty.build(maps, alignments, 1)
+    assert_same(version, patient.build(maps, alignments, 1, patient=True))
+    assert not patient.has_more
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_version_is_the_same_whatever_was_built_before(seed: int) -> None:
     rng = np.random.default_rng(seed)

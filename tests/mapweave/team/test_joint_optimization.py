@@ -22,7 +22,8 @@ LONG = corridor(
     [(1, 2, 4.0), (4, 10, 1.5), (17, 22, 2.0), (30, 32, 1.5), (40, 43, 2.5), (52, 53, 1.0)],
     [(3, 7, 3.2), (13, 16, 2.4), (25, 28, 3.0), (36, 37, 0.8), (46, 51, 1.2), (55, 58.5, 0.7)],
 )
-WHOLE = JointOptimizer(JointOptimizationParameters(newest=True))
+PATIENT = JointOptimizationParameters(at_once=1_000_000)
+WHOLE = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1_000_000))
 BENT = 0.008  # [rad] a submap: what tracking may err by; 1 m between both ends of 60 m
 
 
@@ -88,7 +89,7 @@ def test_maps_bent_against_each_other_come_to_lie_on_each_other(frames: FloatArr
 
 def test_maps_that_fit_stay_where_they_are(frames: FloatArray) -> None:
     cluster, robots, alignments = team(0.0, frames)
-    woven, poses = JointOptimizer().weave(cluster, robots, alignments)
+    woven, poses = JointOptimizer(PATIENT).weave(cluster, robots, alignments)
     lines = bent(robots, poses)
     np.testing.assert_allclose(woven.poses["b/0"], cluster.poses["b/0"], atol=0.02)
     for name, robot in robots.items():
@@ -99,7 +100,7 @@ def test_the_frames_of_the_components_change_nothing(frames: FloatArray) -> None
     distances = []
     for each in (frames, np.zeros((2, 3))):
         cluster, robots, alignments = team(BENT, each)
-        woven, poses = JointOptimizer().weave(cluster, robots, alignments)
+        woven, poses = JointOptimizer(PATIENT).weave(cluster, robots, alignments)
         distances.append(apart(woven, bent(robots, poses)))
     np.testing.assert_allclose(distances[0], distances[1], atol=0.02)
 
@@ -107,14 +108,14 @@ def test_the_frames_of_the_components_change_nothing(frames: FloatArray) -> None
 def test_robots_that_are_nowhere_near_each_other_stay_rigid(frames: FloatArray) -> None:
     cluster, robots, _ = team(BENT, frames)
     far = Cluster({"a/0": np.zeros(3), "b/0": np.array([500.0, 0.0, 0.0])}, cluster.confidence)
-    woven, poses = JointOptimizer().weave(far, robots, [])
+    woven, poses = JointOptimizer(PATIENT).weave(far, robots, [])
     assert woven is far
     np.testing.assert_array_equal(poses["b/0"], [s.pose for s in robots["b/0"]])
 
 
 def test_a_submap_that_grows_still_goes_along_with_the_one_before(frames: FloatArray) -> None:
     cluster, robots, alignments = team(BENT, frames)
-    alone, poses = JointOptimizer().weave(cluster, robots, alignments)
+    alone, poses = JointOptimizer(PATIENT).weave(cluster, robots, alignments)
     lines = bent(robots, poses)
     others = {name: robot[:-1] for name, robot in robots.items()}
     woven, rest = WHOLE.weave(cluster, others, alignments)
@@ -161,7 +162,7 @@ def test_what_was_compared_once_is_not_compared_again(
 ) -> None:
     """A version of the joint map is made every few seconds, of nearly the same submaps."""
     cluster, robots, alignments = team(BENT, frames)
-    weaver = JointOptimizer()
+    weaver = JointOptimizer(PATIENT)
     first, _ = weaver.weave(cluster, robots, alignments)
     monkeypatch.delattr(LoopCloser, "compare_two")
     again, _ = weaver.weave(cluster, robots, alignments)
@@ -172,10 +173,38 @@ def test_what_is_not_compared_at_once_is_compared_the_next_time(frames: FloatArr
     """A coordinator that starts anew makes a version all the same."""
     cluster, robots, alignments = team(BENT, frames)
     weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=5))
-    found = [weaver.weave(cluster, robots, alignments) for _ in range(12)]
-    before = [apart(woven, bent(robots, poses)).max() for woven, poses in found]
+    before: list[float] = []
+    while not before or weaver.has_more:
+        weaver.turn()
+        woven, poses = weaver.weave(cluster, robots, alignments)
+        before.append(float(apart(woven, bent(robots, poses)).max()))
+    assert len(before) > 2
     assert before[0] > before[-1]
     assert before[-1] < 0.1
+    whole, where = WHOLE.weave(cluster, robots, alignments)
+    np.testing.assert_array_equal(woven.poses["b/0"], whole.poses["b/0"])
+    for name, own in where.items():
+        np.testing.assert_array_equal(poses[name], own)
+
+
+def test_a_patient_version_leaves_nothing_to_the_next_one(frames: FloatArray) -> None:
+    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1))
+    weaver.turn(patient=True)
+    woven, _ = weaver.weave(*team(BENT, frames))
+    whole, _ = WHOLE.weave(*team(BENT, frames))
+    assert not weaver.has_more
+    np.testing.assert_array_equal(woven.poses["b/0"], whole.poses["b/0"])
+
+
+def test_what_a_version_asks_for_is_remembered_however_much_that_is(frames: FloatArray) -> None:
+    """Or the next version would compare it again, and never come to an end."""
+    weaver = JointOptimizer(
+        JointOptimizationParameters(newest=True, at_once=1_000_000, remembered=1)
+    )
+    weaver.weave(*team(BENT, frames))
+    weaver.turn()
+    weaver.weave(*team(BENT, frames))
+    assert not weaver.has_more
 
 
 def test_three_robots_and_one_that_saw_nothing_are_woven(frames: FloatArray) -> None:

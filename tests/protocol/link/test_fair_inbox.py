@@ -1,5 +1,7 @@
 """A flood of one sender neither delays the others nor takes their place."""
 
+import threading
+import time
 from collections import Counter
 
 from hypothesis import given
@@ -121,3 +123,16 @@ def test_who_was_away_has_not_saved_up() -> None:
         served.append(keys.sender_of(arrival.key))
         now += 0.1
     assert 15 <= served.count("b") <= 25
+
+
+def test_who_waits_for_an_arrival_can_be_woken_and_loses_none() -> None:
+    inbox = Inbox()
+    threading.Timer(0.05, inbox.wake).start()
+    began = time.monotonic()
+    assert inbox.get(600.0) is None
+    assert time.monotonic() - began < 300.0
+    inbox.wake()
+    assert inbox.get(600.0) is None  # who was not waiting yet is woken as well
+    inbox.add(_arrival("a", 1))
+    inbox.wake()
+    assert _taken(inbox, 2) == [("a", 1)]
