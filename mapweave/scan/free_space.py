@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.geometry import MultiLineString, MultiPolygon, Polygon, box
+from shapely.geometry import LinearRing, MultiLineString, MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
@@ -192,7 +192,23 @@ def simplified(area: BaseGeometry, tolerance: float) -> BaseGeometry:
         return simpler
     # GEOS takes the first corner of an outline away last, though others were measured against
     # lines that ended in it: what both are off by adds up, to less than twice the tolerance.
+    simpler = shapely.simplify(_begun_far_out(area), tolerance)
+    if _follows(simpler, area, tolerance):
+        return simpler
     return shapely.simplify(area, tolerance / 2)
+
+
+def _begun_far_out(area: BaseGeometry) -> BaseGeometry:
+    """Return `area`, its outlines begun at the corner farthest out, which mostly stays."""
+
+    def begun(ring: LinearRing) -> FloatArray:
+        corners = np.array(ring.coords)[:-1]
+        far = np.linalg.norm(corners - corners.mean(axis=0), axis=1).argmax()
+        return np.roll(corners, -far, axis=0)
+
+    return MultiPolygon(
+        [Polygon(begun(q.exterior), [begun(h) for h in q.interiors]) for q in _polygons(area)]
+    )
 
 
 def _follows(simpler: BaseGeometry, area: BaseGeometry, tolerance: float) -> bool:

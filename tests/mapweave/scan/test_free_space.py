@@ -159,6 +159,13 @@ def test_an_outline_deviates_by_no_more_than_allowed_wherever_it_begins(first: i
     room = Polygon(np.roll(BAY, -first, axis=0))
     simpler = simplified(room, 0.3)
     assert shapely.hausdorff_distance(room.boundary, simpler.boundary) <= 0.3
+    assert len(simpler.exterior.coords) < len(room.exterior.coords)
+
+
+def test_an_outline_whose_farthest_corner_may_go_deviates_by_no_more_than_allowed() -> None:
+    flat = Polygon([(7, 2), (2, 5), (-5, 5), (-6, -3), (-5, -4), (-4, -5), (7, -1)])
+    simpler = simplified(flat, 3.0)
+    assert shapely.hausdorff_distance(flat.boundary, simpler.boundary) <= 3.0
 
 
 def test_outlines_put_together_deviate_by_no_more_than_allowed(rng: Generator) -> None:
