@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# shapely 2.2.0 (GEOS 3.14.1): simplify moves an outline by nearly twice the tolerance, by its first corner.
+# shapely 2.2.0 (GEOS 3.14.1): simplify moves an outline by nearly twice the tolerance.
 #
 # Expected: `tolerance` is "the maximum allowed geometry displacement". Where an outline is begun says
 # nothing of the area: the same room from another corner on gives the same simplified room.
@@ -9,7 +9,7 @@
 # may go as well, although what went before was measured against lines that ended in it. The two add
 # up: with 30 cm allowed, a bay 53 cm deep is gone. The result is valid, and `preserve_topology` makes
 # no difference. Outlines drawn by hand begin at a corner and do not show it; those put together by
-# `union_all` or traced on a grid begin anywhere: of such, one of five goes beyond the tolerance. A closed
+# `union_all` or traced on a grid begin anywhere: one of five goes beyond the tolerance. A closed
 # LineString keeps its first corner, and with it the promise.
 #
 # Seen (a room of 10 m by 6 m with a flat bay, 30 cm allowed; 500 unions of four rough discs):

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.geometry import MultiPolygon, Polygon, box
+from shapely.geometry import LinearRing, MultiLineString, MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
@@ -23,6 +23,8 @@ from mapweave.kernels.clearing import (
 )
 from mapweave.kernels.matching.rasters import filled_cells
 from mapweave.parameters import StageParameters, derived
+
+ROUNDING = 1e-9  # of a tolerance, which a corner may be off by exactly
 
 
 class FreeSpaceParameters(StageParameters):
@@ -171,8 +173,50 @@ def _opened(free: BaseGeometry, p: FreeSpaceParameters) -> BaseGeometry:
 
 def _without_crumbs(free: BaseGeometry, p: FreeSpaceParameters) -> BaseGeometry:
     """Return `free`, its outline simplified, without what is not worth sending."""
-    simpler = shapely.simplify(free, p.simplification)
+    simpler = simplified(free, p.simplification)
     return MultiPolygon([q for q in _polygons(simpler) if q.area >= p.min_area])
+
+
+def simplified(area: BaseGeometry, tolerance: float) -> BaseGeometry:
+    """Return `area`, its outlines simplified, none of their corners left out by more than allowed.
+
+    Parameters
+    ----------
+    area
+        In any unit; what of it is no polygon does not count.
+    tolerance
+        By which an outline may deviate, in that unit.
+    """
+    simpler = shapely.simplify(area, tolerance)
+    if _follows(simpler, area, tolerance):
+        return simpler
+    # GEOS takes the first corner of an outline away last, though others were measured against
+    # lines that ended in it: what both are off by adds up, to less than twice the tolerance.
+    simpler = shapely.simplify(_begun_far_out(area), tolerance)
+    if _follows(simpler, area, tolerance):
+        return simpler
+    return shapely.simplify(area, tolerance / 2)
+
+
+def _begun_far_out(area: BaseGeometry) -> BaseGeometry:
+    """Return `area`, its outlines begun at the corner farthest out, which mostly stays."""
+
+    def begun(ring: LinearRing) -> FloatArray:
+        corners = np.array(ring.coords)[:-1]
+        far = np.linalg.norm(corners - corners.mean(axis=0), axis=1).argmax()
+        return np.roll(corners, -far, axis=0)
+
+    return MultiPolygon(
+        [Polygon(begun(q.exterior), [begun(h) for h in q.interiors]) for q in _polygons(area)]
+    )
+
+
+def _follows(simpler: BaseGeometry, area: BaseGeometry, tolerance: float) -> bool:
+    """Whether each corner of `area` has an outline of `simpler` within `tolerance`."""
+    edges = MultiLineString(list(shapely.get_rings(shapely.get_parts(simpler))))
+    shapely.prepare(edges)
+    corners = shapely.points(shapely.get_coordinates(shapely.get_rings(shapely.get_parts(area))))
+    return bool(shapely.dwithin(edges, corners, tolerance * (1 + ROUNDING)).all())
 
 
 def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:

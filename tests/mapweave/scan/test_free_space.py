@@ -10,7 +10,14 @@ from shapely.geometry.base import BaseGeometry
 from mapweave.config import Config, Mapping
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, seen_free, unite
+from mapweave.scan.free_space import (
+    FreeSpaceParameters,
+    from_rings,
+    rings,
+    seen_free,
+    simplified,
+    unite,
+)
 from mapweave.scan.scan import Scan
 from mapweave.scan.visibility import sights_of
 from tests.mapweave.buildings import (
@@ -26,6 +33,8 @@ from tests.mapweave.buildings import (
 P = FreeSpaceParameters()
 CORNERS = rectangle(0, 0, 6, 4)
 ROOM = walls_of(CORNERS)
+# A wall with a flat bay; begun in it, GEOS takes 0.53 m away where 0.3 m are allowed.
+BAY = np.array([(5, -0.28), (5.4, -0.53), (10, 0), (10, 6), (0, 6), (0, 0), (4.6, -0.53)])
 
 
 def free_of(scan: Scan, pose: FloatArray) -> BaseGeometry:
@@ -157,3 +166,36 @@ def test_an_outline_that_runs_back_along_itself_is_an_area_however_it_is_turned(
         turned, beside = (se2.transform_points(pose, part) for part in (outline, outline + 0.05))
         assert from_rings([turned]).area == pytest.approx(area)
         assert area < from_rings([turned, beside]).area < 2 * area
+
+
+@pytest.mark.parametrize("first", range(len(BAY)))
+def test_an_outline_deviates_by_no_more_than_allowed_wherever_it_begins(first: int) -> None:
+    room = Polygon(np.roll(BAY, -first, axis=0))
+    simpler = simplified(room, 0.3)
+    assert shapely.hausdorff_distance(room.boundary, simpler.boundary) <= 0.3
+    assert len(simpler.exterior.coords) < len(room.exterior.coords)
+
+
+def test_an_outline_whose_farthest_corner_may_go_deviates_by_no_more_than_allowed() -> None:
+    flat = Polygon([(7, 2), (2, 5), (-5, 5), (-6, -3), (-5, -4), (-4, -5), (7, -1)])
+    simpler = simplified(flat, 3.0)
+    assert shapely.hausdorff_distance(flat.boundary, simpler.boundary) <= 3.0
+
+
+def test_outlines_put_together_deviate_by_no_more_than_allowed(rng: Generator) -> None:
+    """They begin anywhere, and one of five would go beyond it."""
+    angles = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    for _ in range(40):
+        radii = rng.uniform(2.7, 3.3, (4, 60, 1))
+        ends = radii * np.column_stack([np.cos(angles), np.sin(angles)])
+        seen = from_rings(ends + rng.uniform(0, 4, (4, 1, 2)))
+        edges = simplified(seen, 0.3).boundary
+        corners = shapely.points(shapely.get_coordinates(seen))
+        assert shapely.distance(edges, corners).max() <= 0.3 + 1e-9
+
+
+def test_lines_and_points_beside_an_area_do_not_count() -> None:
+    room = Polygon(BAY)
+    mixed = shapely.GeometryCollection([LineString([(50, 0), (50, 9)]), room, shapely.Point(99, 9)])
+    areas = shapely.get_parts(simplified(mixed, 0.3))
+    assert [q for q in areas if q.area] == [simplified(room, 0.3)]

@@ -8,7 +8,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.scan.free_space import from_rings, rings
+from mapweave.scan.free_space import from_rings, rings, simplified
 
 FINE = 1e-6  # of the unit of the polygons
 
@@ -38,7 +38,7 @@ def straightened(
     # Where it tapers, a mitre goes beyond it. On a grid: without one GEOS 3.14.1 fills, of areas
     # that share most of their outline, a hole here and there, and each is valid.
     wide = shapely.intersection(_valid(sharp), area, grid_size=FINE)
-    simple = _valid(shapely.simplify(wide, deviation))
+    simple = _valid(simplified(wide, deviation))
     whole = shapely.simplify(shapely.set_precision(simple, 1.0), 0.0)
     areas = [p for p in shapely.get_parts(whole) if isinstance(p, Polygon) and not p.is_empty]
     return tuple(
