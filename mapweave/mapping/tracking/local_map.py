@@ -129,7 +129,6 @@ class LocalMap:
         self._known = make_point_map(p.icp.normal_weight, CELL, p.thin, p.keyframes)
         self._viewpoints = make_viewpoints(p.keyframes)
         self._settings = evidence_settings(_settings(p))
-        self._newest = -1
         self._last: FloatArray | None = None
         self._raster: LikelihoodField | None = None
         self._asked: tuple[Scan, tuple[FloatArray, float, float]] | None = None
@@ -138,7 +137,7 @@ class LocalMap:
         """Return one that remembers by itself from now on."""
         other = LocalMap(self._parameters)
         other._known, other._viewpoints = self._known.copy(), self._viewpoints.copy()
-        other._last, other._raster, other._newest = self._last, self._raster, self._newest
+        other._last, other._raster = self._last, self._raster
         return other
 
     @property
@@ -149,7 +148,7 @@ class LocalMap:
     @property
     def newest(self) -> int:
         """The number of the newest point; -1 while there is none."""
-        return self._newest
+        return self._known.newest
 
     @property
     def target(self) -> Target:
@@ -168,8 +167,6 @@ class LocalMap:
             return
         placed = oriented.moved(pose)
         self._known.add(placed.points, placed.normals)
-        _, numbers = self._known.find(placed.points, placed.normals, CELL)
-        self._newest = max(self._newest, int(numbers.max(initial=-1)))
         self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
 
@@ -199,7 +196,7 @@ class LocalMap:
 
         Of those that were seen up to point number `until`.
         """
-        if until >= self._newest:
+        if until >= self.newest:
             return self._known.explains(points.points, points.normals, poses, reach)
         placed = [points.moved(pose) for pose in poses]
         numbers = [self._known.find(at.points, at.normals, reach)[1] for at in placed]
