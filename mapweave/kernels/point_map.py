@@ -76,6 +76,10 @@ class PointMap(Protocol):
         See `mapweave.matching.icp.align_all`.
         """
 
+    @property
+    def newest(self) -> int:
+        """The number of the point that was added last; -1 before the first."""
+
     def content(self) -> tuple[Floats, Floats]:
         """Return (n, 2) points and (n, 2) normals, in the order of their numbers."""
 
@@ -197,6 +201,11 @@ class NumpyPointMap:
         poses = np.array([attempts[k].pose for k in kept]).reshape(-1, 3)
         information = np.array([attempts[k].information for k in kept]).reshape(-1, 3, 3)
         return np.array(kept, dtype=np.int64), poses, information
+
+    @property
+    def newest(self) -> int:
+        """See `PointMap`."""
+        return self._next - 1
 
     def content(self) -> tuple[Floats, Floats]:
         """See `PointMap`."""

@@ -30,15 +30,19 @@ def loose_things(scan: Scan, width: float, gap: float) -> IntArray:
     loose = np.full(len(scan.ranges), -1, dtype=np.int64)
     if len(beams) < 2:
         return loose
-    ranges, points = scan.ranges[beams], scan.points[beams]
-    step = np.diff(ranges)
+    ranges = scan.ranges[beams]
+    step = ranges[1:] - ranges[:-1]
     cuts = np.flatnonzero(np.abs(step) > gap)
-    first, last = np.append(0, cuts + 1), np.append(cuts, len(beams) - 1)
-    nearer_before = np.append(True, step[cuts] < 0)  # than what is before it
-    nearer_after = np.append(step[cuts] > 0, True)
-    ends = points[last] - points[first]
-    short = np.hypot(ends[:, 0], ends[:, 1]) <= width
-    chosen = nearer_before & nearer_after & short & (len(cuts) > 0)
+    if len(cuts) == 0:
+        return loose
+    first, last = np.empty((2, len(cuts) + 1), dtype=np.int64)
+    first[0], first[1:], last[:-1], last[-1] = 0, cuts + 1, cuts, len(beams) - 1
+    chosen = np.ones(len(first), dtype=np.bool_)
+    chosen[1:] = step[cuts] < 0  # nearer than what is before it
+    chosen[:-1] &= step[cuts] > 0
+    points = scan.points
+    ends = points[beams[last]] - points[beams[first]]
+    chosen &= np.hypot(ends[:, 0], ends[:, 1]) <= width
     numbers = np.where(chosen, np.arange(len(first)), -1)
     loose[beams] = np.repeat(numbers, last - first + 1)
     return loose

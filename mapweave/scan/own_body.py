@@ -163,7 +163,8 @@ class OwnBody:
         """Whether the robot did between two scans, by what is not near."""
         far = (before >= self._p.near) & (now >= self._p.near)
         changed = np.abs(now - before)[far] > self._p.moved
-        return bool(len(changed) >= self._p.witnesses and changed.mean() >= self._p.moving)
+        share = np.count_nonzero(changed) / max(len(changed), 1)
+        return bool(len(changed) >= self._p.witnesses and share >= self._p.moving)
 
     def _has_changed(self) -> bool:
         """Whether nearly all did that is not near: where the robot is looks different now."""

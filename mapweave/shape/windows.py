@@ -105,7 +105,7 @@ class Windows:
     @property
     def complexity(self) -> FloatArray:
         """(k,) 1 - straightness², for small angles the paper's sc(P) (VIII-B), in [0, 1]."""
-        return 1 - self.straightness**2
+        return complexity_of(self.straightness)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,6 +144,11 @@ class Candidates:
     def take(self, which: IntArray | BoolArray) -> "Candidates":
         """Return those that the index or mask names."""
         return Candidates(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+def complexity_of(straightness: FloatArray) -> FloatArray:
+    """(k,) complexity of windows of such a similarity (k,) to a straight line."""
+    return 1 - straightness**2
 
 
 def windows(
@@ -218,9 +223,10 @@ def match(a: Windows, b: Windows, parameters: WindowParameters) -> Candidates:
     parameters
         What is salient, similar and close enough, and how many to return.
     """
-    rows, columns = _salient(a, parameters), _salient(b, parameters)
+    straight, others = a.straightness, b.straightness
+    rows, columns = _salient(straight, parameters), _salient(others, parameters)
     product = a.codes[rows] / a.codes.shape[1] @ b.codes[columns].conj().T
-    ours, theirs = _samples(a, rows), _samples(b, columns)
+    ours, theirs = _samples(a, rows, straight), _samples(b, columns, others)
     pairs = alike_windows(product, ours, theirs, parameters.min_similarity, parameters.min_gain)
     found = Candidates(
         a.length * (pairs.gain - pairs.residual / parameters.residual_scale),
@@ -257,17 +263,16 @@ def best(candidates: Candidates, count: int) -> Candidates:
     return candidates.take(np.argsort(-candidates.score, kind="stable")[:count])
 
 
-def _salient(windows: Windows, parameters: WindowParameters) -> IntArray:
-    """Return the most complex windows (H1), in their order on the map."""
-    complexity = windows.complexity
+def _salient(straightness: FloatArray, parameters: WindowParameters) -> IntArray:
+    """Return which windows are the most complex (H1), in their order on the map."""
+    complexity = complexity_of(straightness)
     ranked: IntArray = np.argsort(-complexity, kind="stable")[: parameters.max_windows]
     return np.sort(ranked[complexity[ranked] >= parameters.min_complexity])
 
 
-def _samples(windows: Windows, chosen: IntArray) -> WindowSamples:
+def _samples(windows: Windows, chosen: IntArray, straightness: FloatArray) -> WindowSamples:
     """Return the chosen windows as they are compared."""
-    straightness = windows.straightness[chosen]
-    return WindowSamples(straightness, _places(windows, chosen), windows.points[chosen])
+    return WindowSamples(straightness[chosen], _places(windows, chosen), windows.points[chosen])
 
 
 def _places(windows: Windows, chosen: IntArray) -> IntArray:

@@ -132,7 +132,6 @@ class LocalMap:
         self._viewpoints = make_viewpoints(p.keyframes)
         self._settings = evidence_settings(_settings(p))
         self._things = StandingThings(p.things)
-        self._newest = -1
         self._last: FloatArray | None = None
         self._raster: LikelihoodField | None = None
         self._asked: tuple[Scan, tuple[FloatArray, float, float]] | None = None
@@ -142,7 +141,7 @@ class LocalMap:
         other = LocalMap(self._parameters)
         other._known, other._viewpoints = self._known.copy(), self._viewpoints.copy()
         other._things = self._things.copy()
-        other._last, other._raster, other._newest = self._last, self._raster, self._newest
+        other._last, other._raster = self._last, self._raster
         return other
 
     @property
@@ -153,7 +152,7 @@ class LocalMap:
     @property
     def newest(self) -> int:
         """The number of the newest point; -1 while there is none."""
-        return self._newest
+        return self._known.newest
 
     @property
     def target(self) -> Target:
@@ -193,8 +192,6 @@ class LocalMap:
             return
         placed = self._landmarks(scan, oriented.moved(pose), loose, pose, held=held)
         self._known.add(placed.points, placed.normals)
-        _, numbers = self._known.find(placed.points, placed.normals, CELL)
-        self._newest = max(self._newest, int(numbers.max(initial=-1)))
         self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
 
@@ -239,7 +236,7 @@ class LocalMap:
 
         Of those that were seen up to point number `until`.
         """
-        if until >= self._newest:
+        if until >= self.newest:
             return self._known.explains(points.points, points.normals, poses, reach)
         placed = [points.moved(pose) for pose in poses]
         numbers = [self._known.find(at.points, at.normals, reach)[1] for at in placed]

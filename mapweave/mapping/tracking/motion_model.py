@@ -74,6 +74,8 @@ class MotionModel:
     def __init__(self, parameters: MotionModelParameters) -> None:
         self._p = parameters
         self._steps: deque[tuple[float, float, float]] = deque(maxlen=parameters.known)
+        self._lengths: deque[float] = deque(maxlen=parameters.known)  # [m] of these
+        self._usual: dict[float, tuple[float, float] | None] = {}  # what was asked since the last
         self._off: deque[float] = deque(maxlen=parameters.known)
         self._sigma = parameters.max_sigma  # [m] of a step with a turn that is known
         self._turns: deque[float] = deque(maxlen=parameters.known)  # [rad] from one to the next
@@ -85,6 +87,7 @@ class MotionModel:
         """Return one that goes on by itself from here."""
         other = MotionModel(self._p)
         other._steps, other._off = self._steps.copy(), self._off.copy()
+        other._lengths = self._lengths.copy()
         other._sigma, other._last = self._sigma, self._last
         other._turns = self._turns.copy()
         other._turn_sigma, other._any_sigma = self._turn_sigma, self._any_sigma
@@ -126,21 +129,19 @@ class MotionModel:
 
     def way(self, turn: float) -> tuple[float, float, float]:
         """Return the way x, y [m] that is expected with `turn` [rad], and its sigma [m]."""
-        p = self._p
-        alike = self._alike(turn)
-        if len(alike) < p.enough:
-            return self._last[0], self._last[1], p.max_sigma
-        return median([x for x, _ in alike]), median([y for _, y in alike]), self._sigma
+        usual = self._usual_way(turn)
+        if usual is None:
+            return self._last[0], self._last[1], self._p.max_sigma
+        return *usual, self._sigma
 
     def unknown(self, turn: float) -> tuple[float, float]:
         """Return what is not known of a step with `turn` [rad] that nothing holds: [m], [rad].
 
         It is more than steps differ by: a robot that stops is wrongly expected again and again.
         """
-        p = self._p
-        if len(self._alike(turn)) < p.enough:
-            return p.max_sigma, self._turn_sigma
-        return p.unsure * math.hypot(*self.way(turn)[:2]), self._turn_sigma
+        p, usual = self._p, self._usual_way(turn)
+        way = p.max_sigma if usual is None else p.unsure * math.hypot(*usual)
+        return way, self._turn_sigma
 
     @property
     def is_paced(self) -> bool:
@@ -150,22 +151,23 @@ class MotionModel:
     def reach(self, steps: float) -> float:
         """Return how far [m] a robot comes in so many steps, were each as long as its longest."""
         p = self._p
-        longest = max((math.hypot(x, y) for x, y, _ in self._steps), default=math.inf)
-        return steps * p.faster * longest + p.max_sigma
+        return steps * p.faster * max(self._lengths, default=math.inf) + p.max_sigma
 
     def add(self, step: FloatArray, information: FloatArray) -> None:
         """Take a step (3,), and the (3, 3) information that held it, in units of one point."""
         x, y, turn = step.tolist()
         if ellipse(information).least >= self._p.held:
-            if len(self._alike(turn)) >= self._p.enough:
-                usual_x, usual_y, _ = self.way(turn)
-                self._off.append(math.hypot(x - usual_x, y - usual_y))
+            usual = self._usual_way(turn)
+            if usual is not None:
+                self._off.append(math.hypot(x - usual[0], y - usual[1]))
                 if len(self._off) > self._p.steps:
                     sigma = self._p.spread * median(self._off)
                     self._sigma = min(max(sigma, self._p.min_sigma), self._any_sigma)
             self._steps.append((x, y, turn))
+            self._lengths.append(math.hypot(x, y))
             self._turns.append(abs(math.remainder(turn - self._last[2], 2 * math.pi)))
             self._measure()
+            self._usual = {}
         self._last = (x, y, turn)
 
     def _measure(self) -> None:
@@ -177,8 +179,16 @@ class MotionModel:
         if len(self._turns) <= p.steps:
             return
         self._turn_sigma = max(p.turn_sigma, p.spread * median(self._turns))
-        usual = median(math.hypot(x, y) for x, y, _ in self._steps)
-        self._any_sigma = max(p.max_sigma, p.uneven * usual)
+        self._any_sigma = max(p.max_sigma, p.uneven * median(self._lengths))
+
+    def _usual_way(self, turn: float) -> tuple[float, float] | None:
+        """Return the median way [m] that went with turns like `turn` [rad]; None of too few."""
+        if turn not in self._usual:
+            alike, found = self._alike(turn), None
+            if len(alike) >= self._p.enough:
+                found = median(x for x, _ in alike), median(y for _, y in alike)
+            self._usual[turn] = found
+        return self._usual[turn]
 
     def _alike(self, turn: float) -> list[tuple[float, float]]:
         """Ways that went with turns alike, the latest; to the other side counts as well."""

@@ -64,6 +64,7 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
         twin.add(*block, tags)
         np.testing.assert_allclose(shares(compiled), shares(twin))
     assert len(compiled) == len(twin)
+    assert compiled.newest == twin.newest
     for one, other in zip(compiled.content(), twin.content(), strict=True):
         np.testing.assert_array_equal(one, other)
     asked = oriented(rng, 30)

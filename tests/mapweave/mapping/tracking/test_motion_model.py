@@ -34,6 +34,18 @@ def test_a_way_goes_with_its_turn() -> None:
     np.testing.assert_allclose(motion_model.way(0.35)[:2], ON_THE_SPOT[:2])
 
 
+def test_what_was_expected_before_a_step_is_not_what_is_expected_after_it() -> None:
+    """Also where the same was asked before; and a copy learns by itself."""
+    motion_model = paced(*[STRAIGHT] * 7)
+    np.testing.assert_allclose(motion_model.way(0.01)[:2], STRAIGHT[:2])
+    copied, far = motion_model.copy(), motion_model.reach(1.0)
+    for _ in range(7):
+        copied.add(2 * STRAIGHT * [1, 1, 0.5], HELD)
+    np.testing.assert_allclose(copied.way(0.01)[:2], 2 * STRAIGHT[:2])
+    np.testing.assert_allclose(motion_model.way(0.01)[:2], STRAIGHT[:2])
+    assert copied.reach(1.0) > far == motion_model.reach(1.0)
+
+
 def test_to_the_other_side_a_robot_turns_alike() -> None:
     motion_model = paced(*[ON_THE_SPOT] * 12)
     np.testing.assert_allclose(motion_model.way(-0.35)[:2], ON_THE_SPOT[:2] * [1, -1])
