@@ -24,14 +24,11 @@ from typing import Any
 
 import numpy as np
 import zenoh
-from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
 
 import mapweave_agent
 from benchmarks.logs import find_logs, load_scans
+from benchmarks.ros_scans import ROS2, angles_of, laser_scan, ranges_of, ros1_bag, ros2_bag
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.commands.progress import track
 from mapweave.geometry import se2
@@ -55,7 +52,6 @@ UNSAID = 60.0  # [s] after which a scan is taken to be mapped of which no pose i
 FURTHEST, TURNED = 0.01, 0.1  # [m], [°] off the file's: the bar
 ITSELF, ROUNDED = "the log itself", "rounded, as in a bag"
 TYPE = "sensor_msgs::msg::dds_::LaserScan_"
-ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_JAZZY)
 NATIVE = {
     "ros2, rmw_zenoh": f"0/scan/{TYPE}/{ROS2.hash_rihs01(LASER_SCAN)}",
     "ros2, rmw_zenoh of Humble": f"0/scan/{TYPE}/TypeHashNotSupported",
@@ -146,7 +142,7 @@ def _mapped(scans: Sequence[Scan]) -> Mapped:
 def _rounded(scans: Sequence[Scan]) -> list[Scan]:
     """Return `scans` as a bag has them."""
     with tempfile.TemporaryDirectory() as folder:
-        return list(read_scans(_ros1_bag(Path(folder), scans)))
+        return list(read_scans(ros1_bag(Path(folder), scans)))
 
 
 class Place:
@@ -223,9 +219,9 @@ def _sources(log: Path) -> dict[str, Replay]:
     """Return by its name what replays scans, and returns how many were skipped."""
     return {
         ITSELF: partial(_recording, lambda _folder, _scans: log),
-        "bag of ROS 1": partial(_recording, _ros1_bag),
-        "bag of ROS 2, db3": partial(_recording, partial(_ros2_bag, StoragePlugin.SQLITE3)),
-        "bag of ROS 2, mcap": partial(_recording, partial(_ros2_bag, StoragePlugin.MCAP)),
+        "bag of ROS 1": partial(_recording, ros1_bag),
+        "bag of ROS 2, db3": partial(_recording, partial(ros2_bag, StoragePlugin.SQLITE3)),
+        "bag of ROS 2, mcap": partial(_recording, partial(ros2_bag, StoragePlugin.MCAP)),
         **{name: partial(_topic, key) for name, key in NATIVE.items()},
         "lines of JSON": _lines,
         "Agent.feed": _fed,
@@ -261,7 +257,7 @@ def _topic(key: str, place: Place, scans: Sequence[Scan]) -> int:
             time.sleep(0.1)
             matching = publisher.matching_status
         for index, scan in enumerate(scans):
-            publisher.put(bytes(ROS2.serialize_cdr(_message(ROS2, scan), LASER_SCAN)))
+            publisher.put(bytes(ROS2.serialize_cdr(laser_scan(ROS2, scan), LASER_SCAN)))
             place.wait_until_mapped(index)
         return place.wait_until_finished()
 
@@ -271,7 +267,7 @@ def _lines(place: Place, scans: Sequence[Scan]) -> int:
         assert process.stdin is not None
         place.wait_until_here()
         for index, scan in enumerate(scans):
-            line = {"stamp": scan.stamp, "ranges": _ranges(scan).tolist(), **_angles(scan)}
+            line = {"stamp": scan.stamp, "ranges": ranges_of(scan).tolist(), **angles_of(scan)}
             process.stdin.write(json.dumps(line).replace("Infinity", "null") + "\n")
             process.stdin.flush()
             place.wait_until_mapped(index)
@@ -284,60 +280,9 @@ def _fed(place: Place, scans: Sequence[Scan]) -> int:
         ROBOT, TEAM, connect=place.endpoint, state=place.state, patience=PATIENCE
     ) as agent:
         for index, scan in enumerate(scans):
-            agent.feed(_ranges(scan), stamp=scan.stamp, **_angles(scan))
+            agent.feed(ranges_of(scan), stamp=scan.stamp, **angles_of(scan))
             place.wait_until_mapped(index)
     return agent.skipped
-
-
-def _ranges(scan: Scan) -> FloatArray:
-    return np.where(scan.hits, scan.ranges, np.inf).astype(np.float32).astype(np.float64)
-
-
-def _angles(scan: Scan) -> dict[str, float]:
-    step = float(np.ptp(scan.angles)) / (len(scan.angles) - 1)
-    return {
-        "angle_min": float(np.float32(scan.angles[0])),
-        "angle_increment": float(np.float32(step)),
-    }
-
-
-def _message(store: Typestore, scan: Scan, **header: int) -> object:
-    """Return `scan` as a ``LaserScan``; `header` has what else that of a release has."""
-    types, angles = store.types, _angles(scan)
-    second = int(scan.stamp // 1)
-    stamp = types["builtin_interfaces/msg/Time"](
-        sec=second, nanosec=round((scan.stamp - second) * 1e9)
-    )
-    return types[LASER_SCAN](
-        header=types["std_msgs/msg/Header"](stamp=stamp, frame_id="laser", **header),
-        **angles,
-        angle_max=float(scan.angles[-1]),
-        time_increment=0.0,
-        scan_time=0.0,
-        range_min=0.0,
-        range_max=1000.0,
-        ranges=_ranges(scan).astype(np.float32),
-        intensities=np.zeros(0, dtype=np.float32),
-    )
-
-
-def _ros1_bag(folder: Path, scans: Sequence[Scan]) -> Path:
-    with Writer1(folder / "scans.bag") as writer:
-        connection = writer.add_connection("/scan", LASER_SCAN, typestore=ROS1)
-        for number, scan in enumerate(scans):
-            message = _message(ROS1, scan, seq=number)
-            data = bytes(ROS1.serialize_ros1(message, LASER_SCAN))
-            writer.write(connection, number * 10**8, data)
-    return folder / "scans.bag"
-
-
-def _ros2_bag(storage: StoragePlugin, folder: Path, scans: Sequence[Scan]) -> Path:
-    with Writer2(folder / "scans", version=9, storage_plugin=storage) as writer:
-        connection = writer.add_connection("/scan", LASER_SCAN, typestore=ROS2)
-        for number, scan in enumerate(scans):
-            data = bytes(ROS2.serialize_cdr(_message(ROS2, scan), LASER_SCAN))
-            writer.write(connection, number * 10**8, data)
-    return folder / "scans"
 
 
 def _compared(log: str, source: str, expected: Mapped, found: Mapped, skipped: int) -> Outcome:
