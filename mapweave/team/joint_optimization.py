@@ -50,10 +50,10 @@ class JointOptimizationParameters(StageParameters):
         " team it grows with every message, and goes along with the one before",
     )
     at_once: int = Field(
-        40,
+        20,
         ge=1,
-        description="new comparisons for a version, a part of a second; more wait for the next one,"
-        " and the maps that have come do not",
+        description="new comparisons for a version, a tenth of a second; more wait for the next"
+        " one, and the maps that have come do not",
     )
     remembered: int = Field(20_000, ge=1, description="comparisons, the last")
 
