@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <tuple>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -17,6 +17,8 @@ namespace shape_index {
 constexpr double kTurn = 6.283185307179586476925286766559;
 constexpr int kSteps = 4096;      // of a turn that places are told by
 constexpr double kFarthest = 320; // [m] from a map's origin; words beyond are left out
+constexpr size_t kNone = SIZE_MAX;
+constexpr size_t kFewCells = 40;  // of one map, that are all compared
 
 // Angles are in 1/65536 of a turn, lengths in mm, places in cm: 16 bytes a word.
 struct Word {
@@ -289,23 +291,43 @@ class ShapeIndex {
            static_cast<uint64_t>(turn);
   }
 
-  // A cell together with those beside it.
+  // A cell together with those beside it, in the same order however these are found.
   Cell gathered(uint64_t key) const {
+    std::array<const Cell*, 27> beside{};
+    if (ballot_.cells.size() < kFewCells)
+      scan(key, beside);
+    else
+      probe(key, beside);
     Cell sum{key, 0, 0, 0, 0, 0};
+    for (const Cell* near : beside) {
+      if (!near) continue;
+      sum.votes += near->votes;
+      sum.x += near->x;
+      sum.y += near->y;
+      sum.cosine += near->cosine;
+      sum.sine += near->sine;
+    }
+    return sum;
+  }
+
+  // Few cells are sooner compared than 27 looked up.
+  void scan(uint64_t key, std::array<const Cell*, 27>& beside) const {
+    for (const Cell& near : ballot_.cells) {
+      const int64_t dx = static_cast<int64_t>(near.key >> 24 & 0xFFFF) - static_cast<int64_t>(key >> 24 & 0xFFFF) + 1;
+      const int64_t dy = static_cast<int64_t>(near.key >> 8 & 0xFFFF) - static_cast<int64_t>(key >> 8 & 0xFFFF) + 1;
+      if (dx < 0 || dx > 2 || dy < 0 || dy > 2) continue;
+      const int turned = static_cast<int>(near.key & 0xFF) - static_cast<int>(key & 0xFF);
+      const int dt = (turned + 1 + cell_turns_) % cell_turns_;
+      if (dt <= 2) beside[9 * dx + 3 * dy + dt] = &near;
+    }
+  }
+
+  void probe(uint64_t key, std::array<const Cell*, 27>& beside) const {
     const uint64_t slot = key >> 40;
     const int64_t x = key >> 24 & 0xFFFF, y = key >> 8 & 0xFFFF, turn = key & 0xFF;
-    for (int dx = -1; dx <= 1; ++dx)
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dt = -1; dt <= 1; ++dt) {
-          const Cell* near = ballot_.find(cell_key(slot, x + dx, y + dy, (turn + dt + cell_turns_) % cell_turns_));
-          if (!near) continue;
-          sum.votes += near->votes;
-          sum.x += near->x;
-          sum.y += near->y;
-          sum.cosine += near->cosine;
-          sum.sine += near->sine;
-        }
-    return sum;
+    for (int k = 0; k < 27; ++k)
+      beside[k] = ballot_.find(
+          cell_key(slot, x + k / 9 - 1, y + k / 3 % 3 - 1, (turn + k % 3 - 1 + cell_turns_) % cell_turns_));
   }
 
   // The cells that are the most voted by themselves, together with those beside them.
@@ -355,20 +377,27 @@ class ShapeIndex {
   std::tuple<Out<int64_t>, Out<double>, Out<double>> best(const std::vector<size_t>& start, const double* middle,
                                                           size_t count, double distance, double turn) const {
     std::vector<Cell> leaders = led(start, 4 * count);
-    std::sort(leaders.begin(), leaders.end(), before);
+    const auto after = [](const Cell& a, const Cell& b) { return before(b, a); };
+    std::make_heap(leaders.begin(), leaders.end(), after);  // not all of them are wanted
     std::vector<int64_t> slots;
     std::vector<double> transforms, votes;
-    std::unordered_map<uint64_t, std::vector<std::array<double, 3>>> kept;
-    for (const Cell& cell : leaders) {
-      if (slots.size() >= count) break;
+    std::vector<std::array<double, 3>> kept;
+    std::vector<size_t> older, newest(start.size(), kNone);  // of the places that are kept, those of one map
+    while (slots.size() < count && !leaders.empty()) {
+      std::pop_heap(leaders.begin(), leaders.end(), after);
+      const Cell cell = leaders.back();
+      leaders.pop_back();
       const double x = cell.x / cell.votes, y = cell.y / cell.votes, theta = std::atan2(cell.sine, cell.cosine);
-      auto& others = kept[cell.key >> 40];
-      const bool differs = std::all_of(others.begin(), others.end(), [&](const std::array<double, 3>& o) {
-        return std::hypot(x - o[0], y - o[1]) > distance || std::abs(std::remainder(theta - o[2], kTurn)) > turn;
-      });
+      const size_t slot = cell.key >> 40;
+      bool differs = true;
+      for (size_t k = newest[slot]; k != kNone && differs; k = older[k])
+        differs = std::hypot(x - kept[k][0], y - kept[k][1]) > distance ||
+                  std::abs(std::remainder(theta - kept[k][2], kTurn)) > turn;
       if (!differs) continue;
-      others.push_back({x, y, theta});
-      slots.push_back(static_cast<int64_t>(cell.key >> 40));
+      older.push_back(newest[slot]);
+      newest[slot] = kept.size();
+      kept.push_back({x, y, theta});
+      slots.push_back(static_cast<int64_t>(slot));
       votes.push_back(cell.votes);
       const double c = std::cos(theta), s = std::sin(theta);
       transforms.insert(transforms.end(), {x - c * middle[0] + s * middle[1], y - s * middle[0] - c * middle[1], theta});
