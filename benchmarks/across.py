@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.fusion import outcome_rows
 from benchmarks.logs import find_logs
 from benchmarks.pairs import compare
-from benchmarks.runs import sources
+from benchmarks.runs import COMPARING, MAPPING, sources
 from benchmarks.stretches import Stretch, map_stretches
 from benchmarks.tables import OUTPUT
 from mapweave.commands.progress import track
@@ -75,13 +75,17 @@ def _kept(file: Path) -> list[dict[str, Any]]:
     if not file.is_file():
         return []
     rows = [json.loads(line) for line in file.read_text().splitlines()]
-    return rows if all(row["sources"] == sources().hex() for row in rows) else []
+    return rows if all(row["sources"] == _sources() for row in rows) else []
+
+
+def _sources() -> str:
+    return sources(MAPPING, COMPARING).hex()
 
 
 def _compared(first: Stretch, second: Stretch) -> dict[str, Any]:
     found = outcome_rows(compare(first, second))
     names = {"first": first.name, "second": second.name}
-    return {**names, "sources": sources().hex(), "alignments": found}
+    return {**names, "sources": _sources(), "alignments": found}
 
 
 def is_joined(row: dict[str, Any]) -> bool:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import grimp  # what import-linter reads imports with
+
 import mapweave
 from benchmarks.killian import CACHE
 from mapweave.commands.progress import track
@@ -14,6 +16,9 @@ from mapweave.io.map_files import read_map, write_map
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
+from mapweave.shape.background import FILE as BACKGROUND
+
+MAPPING, COMPARING = "mapweave.mapping.mapper", "mapweave.fusion.align"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,17 +51,33 @@ def map_remembered(name: str, log: Path, scans: Sequence[Scan], robot: str) -> R
 def _fingerprint(log: Path, scans: Sequence[Scan], robot: str) -> str:
     """Name what a map depends on: the sources, the log, the scans, the robot's name."""
     digest = hashlib.sha256(f"{robot} {scans[0].index} {scans[-1].index} {len(scans)}".encode())
-    digest.update(sources())
+    digest.update(sources(MAPPING))
     digest.update(log.read_bytes())
     return digest.hexdigest()[:24]
 
 
 @cache
-def sources() -> bytes:
-    """Return a digest of mapweave's sources, once: those that this process runs."""
+def sources(*modules: str) -> bytes:
+    """Return a digest of what `modules` of mapweave run, once: theirs, what they import, kernels.
+
+    So what is remembered stays so as long as nothing that it comes of is changed.
+    """
+    package, graph = Path(mapweave.__file__).parent, _imports()
+    used = set(modules).union(*(graph.find_upstream_modules(module) for module in modules))
+    kernels = (p for p in (package / "kernels").rglob("*") if p.suffix in (".hpp", ".cpp"))
+    files = {_file(package, module) for module in used} | {*kernels, BACKGROUND}
     digest = hashlib.sha256()
-    package = Path(mapweave.__file__).parent
-    for source in sorted(package.rglob("*.py")):
-        digest.update(source.relative_to(package).as_posix().encode())
-        digest.update(source.read_bytes())
+    for file in sorted(files):
+        digest.update(file.relative_to(package).as_posix().encode())
+        digest.update(file.read_bytes())
     return digest.digest()
+
+
+@cache
+def _imports() -> grimp.ImportGraph:
+    return grimp.build_graph("mapweave", cache_dir=None)
+
+
+def _file(package: Path, module: str) -> Path:
+    path = package.joinpath(*module.split(".")[1:])
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")

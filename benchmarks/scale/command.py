@@ -1,6 +1,7 @@
 """Scale: a team of a hundred robots and more on a virtual clock: who compares what, what it costs.
 
-Robots of recordings, each stretch as one, and of buildings made up; real messages, no network.
+Robots of recordings, each stretch as one, and of buildings made up; real messages, no network. Maps
+and what was compared are kept, and a run goes on where the one before ended.
 """
 
 import argparse
@@ -16,9 +17,10 @@ import scipy
 from benchmarks.logs import find_logs
 from benchmarks.scale.driving import Costs, Driven, Pair, drive
 from benchmarks.scale.members import Member, is_joined_right, made_up, recorded
+from benchmarks.scale.remembered import compare_remembered
 from benchmarks.tables import OUTPUT, format_table, write_json
 from mapweave.commands.progress import track
-from mapweave.fusion.align import FusionParameters, align
+from mapweave.fusion.align import FusionParameters
 from mapweave.maps import Alignment
 from mapweave.team.joint_builder import JointMapBuilder
 from mapweave.text import percent
@@ -128,8 +130,10 @@ def compare_all(team: Sequence[Member], driven: Driven, costs: Costs) -> Joins:
     for pair in track(sorted(within | set(driven.due)), "comparing"):
         one, other = team[pair[0]], team[pair[1]]
         proposed = pair in driven.due
-        with costs.of("a pair compared" if proposed else "a pair that is not proposed"):
-            each = align(one.robot_map, other.robot_map, p)
+        compared = compare_remembered(one.robot_map, other.robot_map, p)
+        what = "a pair compared" if proposed else "a pair that is not proposed"
+        costs.add(what, compared.seconds)
+        each = compared.alignments
         joined = [a for a in each if a.decision == "accepted"]
         right = [is_joined_right(one, other, a) for a in joined]
         if proposed:

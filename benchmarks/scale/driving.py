@@ -35,7 +35,11 @@ class Costs:
         """Count what is done within."""
         start = time.process_time()
         yield
-        self.seconds[what] += time.process_time() - start
+        self.add(what, time.process_time() - start)
+
+    def add(self, what: str, seconds: float) -> None:
+        """Count what was done once, and took so long."""
+        self.seconds[what] += seconds
         self.count[what] += 1
 
     def mean(self, what: str) -> float:

@@ -4,7 +4,8 @@ Hypothesise by shape, verify by geometry, for all maps at once. The words of a m
 are looked up in an index of the words of all maps, the rarest first: what is salient is what is
 rare in what was seen so far (H1). Words that are alike (H2) vote for places, a map and a rigid
 transform. What is voted most is scored by what both saw, walls and free space, and the best is
-returned. Neither grows much with the number of maps: what is looked at is bounded.
+returned. Neither grows much with the number of maps: what is looked at is bounded, and grows by
+less than their root from a thousand on.
 """
 
 from collections.abc import Hashable
@@ -17,7 +18,7 @@ from pydantic import Field
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view, score_views
 from mapweave.kernels.matching.rasters import cell_codes
-from mapweave.kernels.matching.shape_index import IndexSettings, shape_index
+from mapweave.kernels.matching.shape_index import Found, IndexSettings, shape_index
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.verification import VerificationParameters
@@ -34,7 +35,8 @@ class PlaceIndexParameters(StageParameters):
     """How words are told apart, and how much is looked at.
 
     Chosen on submaps of `csail-thinned`, `fr079` and `seattle` in 6 stretches each, among 1000;
-    how many words are looked at and places voted and scored, on six logs in 3 to 8.
+    how many words are looked at and places voted and scored, on six logs in 3 to 8; by what power
+    of the maps these grow, on six logs in 4 and 7 among 10,000.
     """
 
     words: WordParameters = WordParameters()
@@ -49,6 +51,8 @@ class PlaceIndexParameters(StageParameters):
     voted: int = Field(500, ge=1, description="places that are looked at, the most voted")
     stride: int = Field(5, ge=1, description="of the samples these are scored by at first")
     scored: int = Field(30, ge=1, description="of them that are scored by all samples, the best")
+    usual: int = Field(1000, ge=1, description="maps that these three are for, or fewer")
+    growth: float = Field(0.4, ge=0, le=1, description="power of the maps by which they grow")
     distance: float = Field(0.35, gt=0, description="[m] between different places of one map")
     turn: float = Field(0.1, gt=0, description="[rad] between those: 6°")
     raster: DistanceFieldParameters = derived(
@@ -154,17 +158,10 @@ class PlaceIndex(Generic[Key]):
         but
             Whose maps are not looked in, unless it is None.
         """
-        p, words = self._p, shape.words
-        owner = self._owner[: len(self._keys)]
-        left_out = NOBODY if but is None else self._owners.get(but, NOBODY)
-        allowed = (owner != NOBODY) & (owner != left_out)
-        slots, transforms, votes = self._words.places(
-            *(words.words, words.kind, words.middle, allowed.astype(np.uint8)),
-            *(p.budget, p.voted, p.distance, p.turn),
-        )
+        p, (slots, transforms, votes) = self._p, self._voted(shape, but)
         # By few samples first: what is voted most is many times what is worth a closer look.
         rough = self._scores(shape, slots, transforms, p.stride)
-        kept = np.argsort(-rough, kind="stable")[: p.scored]
+        kept = np.argsort(-rough, kind="stable")[: round(p.scored * self._more())]
         scores = self._scores(shape, slots[kept], transforms[kept], 1)
         ranked = np.argsort(-scores, kind="stable")[:count]
         named = [(self._keys[slots[kept[k]]], k, kept[k]) for k in ranked.tolist()]
@@ -173,6 +170,26 @@ class PlaceIndex(Generic[Key]):
             for key, k, place in named
             if key is not None
         ]
+
+    def _voted(self, shape: PlaceShape, but: Hashable) -> Found:
+        """Return slots, transforms and votes of the places that words say."""
+        p, words = self._p, shape.words
+        owner = self._owner[: len(self._keys)]
+        left_out = NOBODY if but is None else self._owners.get(but, NOBODY)
+        allowed = (owner != NOBODY) & (owner != left_out)
+        more = self._more()
+        return self._words.places(
+            *(words.words, words.kind, words.middle, allowed.astype(np.uint8)),
+            *(round(p.budget * more), round(p.voted * more), p.distance, p.turn),
+        )
+
+    def _more(self) -> float:
+        """How many times as much is looked at as among the usual number of maps.
+
+        Among more maps more words are alike by chance, and the right place is voted by fewer of
+        those looked at. What both saw tells it as before, once it is among those scored.
+        """
+        return float(max(len(self) / self._p.usual, 1.0) ** self._p.growth)
 
     def _scores(
         self, shape: PlaceShape, slots: IntArray, transforms: FloatArray, stride: int

@@ -6,7 +6,7 @@ import pytest
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
-from mapweave.matching.place_index import PlaceIndex
+from mapweave.matching.place_index import Place, PlaceIndex, PlaceIndexParameters
 from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, part, shaken
 
 MOTION = np.array([7.0, -4.0, 2.2])
@@ -101,3 +101,21 @@ def test_places_are_found_with_and_without_compiled_kernels(
     index = filled()
     found = index.query(index.prepare(moved(part(BUILDING, 6.0, 18.0))), count=1)
     assert error(found[0].transform)[0] < 0.5
+
+
+def looked_up(usual: int, budget: int, voted: int) -> list[Place[int]]:
+    """Look a map up among eight; all that is voted is scored."""
+    said = {"usual": usual, "growth": 0.5, "budget": budget, "voted": voted, "scored": 1000}
+    index: PlaceIndex[int] = PlaceIndex(PlaceIndexParameters().model_copy(update=said))
+    for k in range(8):
+        index.add(k, index.prepare(part(BUILDING, 2.0 * k, 2.0 * k + 12.0)))
+    return index.query(index.prepare(moved(part(BUILDING, 6.0, 18.0))), 1000)
+
+
+def test_among_more_maps_more_words_and_places_are_looked_at() -> None:
+    of_eight, of_two = looked_up(8, 1000, 30), looked_up(2, 500, 15)
+    assert len(of_two) == len(of_eight) == 30
+    assert [place.votes for place in of_two] == [place.votes for place in of_eight]
+    assert len(looked_up(8, 1000, 15)) == 15
+    fewer_words = looked_up(8, 500, 30)
+    assert [place.votes for place in fewer_words] != [place.votes for place in of_eight]
