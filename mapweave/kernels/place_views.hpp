@@ -9,6 +9,8 @@
 
 namespace place_views {
 
+constexpr size_t kAhead = 4;  // places before one that what it reads is fetched
+
 class PlaceView {
  public:
   // codes (rows, columns): what a cell says. samples (n, 4): x, y, direction in turns, metres of wall.
@@ -26,20 +28,21 @@ class PlaceView {
   // What the walls of `other`, every `stride`th sample, count in this map, at the pose x, y, theta of it.
   double worth(const PlaceView& other, double x, double y, double theta, size_t stride, const double* table,
                size_t said, size_t directions) const {
-    const double c = std::cos(theta), s = std::sin(theta), turn = theta / 6.283185307179586476925286766559 + 2;
-    const double rows = static_cast<double>(rows_), columns = static_cast<double>(columns_);
+    const double turn = theta / 6.283185307179586476925286766559 + 2;
     double sum = 0;
-    for (size_t k = 0; k < other.samples_.size(); k += 4 * stride) {
-      const double* p = other.samples_.data() + k;
-      const double row = (c * p[0] - s * p[1] + x - origin_[0]) / cell_;
-      const double column = (s * p[0] + c * p[1] + y - origin_[1]) / cell_;
-      if (!(row >= 0 && column >= 0 && row < rows && column < columns)) continue;
-      const size_t code = codes_[static_cast<size_t>(row) * columns_ + static_cast<size_t>(column)];
+    each_cell(other, x, y, theta, stride, [&](const double* p, const uint8_t& cell) {
+      const size_t code = cell;
       size_t facing = static_cast<size_t>((p[2] + turn) * static_cast<double>(directions));
       while (facing >= directions) facing -= directions;  // thrice at most: sooner done than a division
       if (code < said) sum += p[3] * table[code * directions + facing];
-    }
+    });
     return sum;
+  }
+
+  // Fetches what will be read here for `worth`: of thousands of maps, most are far away.
+  void fetch(const PlaceView& other, double x, double y, double theta, size_t stride) const {
+    for (size_t k = 0; k < samples_.size(); k += 4 * stride) __builtin_prefetch(samples_.data() + k);
+    each_cell(other, x, y, theta, stride, [](const double*, const uint8_t& cell) { __builtin_prefetch(&cell); });
   }
 
   int64_t rows() const { return static_cast<int64_t>(rows_); }
@@ -59,6 +62,20 @@ class PlaceView {
   const double* sample(size_t k) const { return samples_.data() + 4 * k; }
 
  private:
+  // Calls `seen` with every `stride`th sample of `other` that lies in this map, and the cell that it lies in.
+  template <typename Seen>
+  void each_cell(const PlaceView& other, double x, double y, double theta, size_t stride, Seen seen) const {
+    const double c = std::cos(theta), s = std::sin(theta);
+    const double rows = static_cast<double>(rows_), columns = static_cast<double>(columns_);
+    for (size_t k = 0; k < other.samples_.size(); k += 4 * stride) {
+      const double* p = other.samples_.data() + k;
+      const double row = (c * p[0] - s * p[1] + x - origin_[0]) / cell_;
+      const double column = (s * p[0] + c * p[1] + y - origin_[1]) / cell_;
+      if (!(row >= 0 && column >= 0 && row < rows && column < columns)) continue;
+      seen(p, codes_[static_cast<size_t>(row) * columns_ + static_cast<size_t>(column)]);
+    }
+  }
+
   size_t rows_, columns_;
   std::vector<uint8_t> codes_;
   double origin_[2], cell_;
@@ -71,11 +88,14 @@ inline Out<double> score_views(const PlaceView& other, const std::vector<const P
                                In<double, 2> transforms, In<double, 2> table, int64_t stride) {
   if (transforms.shape(0) != views.size() || transforms.shape(1) != 3 || table.shape(1) == 0 || stride < 1)
     throw std::invalid_argument("transforms (n, 3) of n views, table (codes, directions), stride >= 1 expected");
+  for (size_t k = 0; k < views.size(); ++k)
+    if (!(std::isfinite(transforms(k, 0)) && std::isfinite(transforms(k, 1)) && std::abs(transforms(k, 2)) < 7))
+      throw std::invalid_argument("transforms: finite numbers, angles within a turn expected");
   std::vector<double> scores(views.size());
   for (size_t k = 0; k < views.size(); ++k) {
     const double x = transforms(k, 0), y = transforms(k, 1), theta = transforms(k, 2);
-    if (!(std::isfinite(x) && std::isfinite(y) && std::abs(theta) < 7))
-      throw std::invalid_argument("transforms: finite numbers, angles within a turn expected");
+    if (const size_t n = k + kAhead; n < views.size())
+      views[n]->fetch(other, transforms(n, 0), transforms(n, 1), transforms(n, 2), static_cast<size_t>(stride));
     const double c = std::cos(theta), s = std::sin(theta);
     const auto worth = [&](const PlaceView& in, const PlaceView& of, double px, double py, double turn) {
       return in.worth(of, px, py, turn, static_cast<size_t>(stride), table.data(), table.shape(0), table.shape(1));
