@@ -113,6 +113,7 @@ MEASURED: dict[str, dict[str, object]] = {
         "max_gap": 0.5,
         "free_space_turn": 0.26,
     },
+    "SweepParameters": {"reach": 0.06},
     "TrackerParameters": {
         "line_spacing": 0.1,
         "max_step": 2.5,
