@@ -12,10 +12,11 @@ from benchmarks.logs import Log, find_logs, load_scans, load_truth
 from mapweave.geometry.arrays import FloatArray
 from mapweave.scan.scan import Scan
 from mapweave_deploy.sim.lidar import LidarParameters
+from mapweave_deploy.sim.lidars import LIDARS
 from mapweave_deploy.sim.office import office
 from mapweave_deploy.sim.own_body import OwnBodyParameters
 from mapweave_deploy.sim.people import PeopleParameters
-from mapweave_deploy.sim.settings import SETTINGS
+from mapweave_deploy.sim.settings import SETTINGS, Setting
 from mapweave_deploy.sim.sweeps import SweepParameters, sweeps
 from mapweave_deploy.sim.trajectories import Tour, TourParameters, drive, plan_tours
 from mapweave_deploy.sim.world import World, box, disc, make_world
@@ -94,9 +95,24 @@ def worlds(seeds: int) -> Iterator[Case]:
     """Yield a drive through each built-in world, made from so many seeds."""
     for name, setting in SETTINGS.items():
         for seed in range(1, seeds + 1):
-            ground, [place] = setting.places(seed, 1)
-            [tour] = plan_tours(ground, 1, setting.tours, np.random.default_rng([seed, 1]))
-            yield seen(_group(name), f"{name} {seed}", place, tour, setting.sweeps)
+            yield _driven(_group(name), f"{name} {seed}", setting, seed)
+
+
+def crowds(seeds: int) -> Iterator[Case]:
+    """Yield a drive among people who walk along and pass, of each lidar, from so many seeds."""
+    for name, lidar in LIDARS.items():
+        if name in ("upside-down", "mirrored"):
+            continue
+        plain = lidar.parameters.model_copy(update={"order": "counter-clockwise"})
+        setting = SETTINGS["crowd"].with_lidar(lidar._replace(parameters=plain))
+        for seed in range(1, seeds + 1):
+            yield _driven("crowd", f"{name} {seed}", setting, seed)
+
+
+def _driven(group: str, name: str, setting: Setting, seed: int) -> Case:
+    ground, [place] = setting.places(seed, 1)
+    [tour] = plan_tours(ground, 1, setting.tours, np.random.default_rng([seed, 1]))
+    return seen(group, name, place, tour, setting.sweeps)
 
 
 def _group(world: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.coverage import metres_in_common, returns_at, wall_cells
-from benchmarks.robot_cases import Case, recordings, simulated, worlds
+from benchmarks.robot_cases import Case, crowds, recordings, simulated, worlds
 from benchmarks.speed.rows import Figure
 from benchmarks.tables import OUTPUT, format_table, write_json
 from benchmarks.truth import Path2D, paths, position_error, steps_right, true_frame
@@ -91,7 +91,8 @@ def run(options: argparse.Namespace) -> None:
         With status 1 if a figure falls short, unless only a report was asked for.
     """
     outcomes = []
-    for case in chain(recordings(), simulated(options.seconds), worlds(options.seeds)):
+    simulations = simulated(options.seconds), crowds(options.seeds), worlds(options.seeds)
+    for case in chain(recordings(), *simulations):
         if not options.only or case.group in options.only:
             outcomes.append(measure(case))
             write_json(options.output, [asdict(each) for each in outcomes])
@@ -191,7 +192,7 @@ def figures(outcome: Outcome) -> Iterator[Figure]:
         yield Figure("worst scan / median", o.worst, 10)
     elif group in SHARES:
         yield Figure("largest", 100 * o.largest, 100 * largest, "%", at_least=True)
-    elif group != "world":
+    elif group not in ("crowd", "world"):
         yield Figure("components", o.components, 1)
     if right is not None:
         yield Figure("steps right", 100 * o.steps_right, 100 * right, "%", at_least=True)

@@ -189,7 +189,7 @@ class Tracker:
         self.pose = tracked.pose
         self._reachability.placed(seen.scan, tracked.pose)
         loose, held = (
-            seen.loose & self._walled(seen),
+            seen.loose & self._spares_things(seen),
             not is_open(tracked, self.parameters.acceptance),
         )
         self._local.remember(seen.scan, seen.walls, loose, tracked.pose, held=held)
@@ -198,14 +198,20 @@ class Tracker:
     def _relied_on(self, seen: Observation, near: FloatArray) -> Observation:
         """Return what of `seen` tells where it was taken, which is `near` (3,).
 
-        Where things move, those count that are known to stand; where there is little wall, all do.
+        Where things move, those count that are known to stand.
         """
-        if not self._local.distrusts_things or not seen.is_loose.any() or not self._walled(seen):
+        if not self._local.distrusts_things or not self._spares_things(seen):
             return seen
         return seen.relying_on(self._local.lies_on(seen.oriented, near))
 
-    def _walled(self, seen: Observation) -> bool:
-        return seen.has_walls(self.parameters.min_points, self.parameters.min_solid)
+    def _spares_things(self, seen: Observation) -> bool:
+        """Whether it can do without things that may move, until they are known to stand.
+
+        Not where there is little else, nor where scans are so far apart that all is needed.
+        """
+        p, interval = self.parameters, self._reachability.interval
+        often = interval is not None and interval <= p.often
+        return bool(often and seen.is_loose.any()) and seen.has_walls(p.min_points, p.min_solid)
 
     def _drifted(self, seen: Observation, tracked: ScanMatch) -> ScanMatch:
         """Note a step, and how far it may be off; return the scan where it ends, with that."""

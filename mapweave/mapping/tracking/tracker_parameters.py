@@ -31,6 +31,9 @@ class TrackerParameters(StageParameters):
         description="share of the returns on walls, to do without things that may move: in a hall"
         " full of them they are all there is",
     )
+    often: float = Field(
+        1.0, gt=0, description="[s] from scan to scan, at the most, to do without them"
+    )
     max_points: int = Field(180, ge=10, description="of a scan, in the alignment")
     max_step: float = derived(
         lambda c: 0.5 + c.robot.max_speed * c.sensor.interval,
