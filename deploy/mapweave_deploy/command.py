@@ -200,7 +200,7 @@ def _source(options: argparse.Namespace) -> str:
 
 def _how_to_watch(plan: Plan) -> Iterator[str]:
     keys = "" if plan.keys is None else " --tls DIR, with keys of the team"
-    yield f"From elsewhere: mapweave watch --team {plan.team} --connect {plan.listen}{keys}"
+    yield f"In another terminal: mapweave watch --team {plan.team} --connect {plan.listen}{keys}"
 
 
 def _is_attended(console: Console) -> bool:

@@ -180,13 +180,15 @@ class Service:
     def _keep(self, built: Built) -> Built:
         """Store a version; return it, as one of another series where there is no room."""
         number = built.draft.version
+        # While submaps wait, something is news to who starts again after a crash.
+        covers = self._covers - built.has_more
         try:
-            self._store.add_version(number, built.begun, built.payload, self._covers)
+            self._store.add_version(number, built.begun, built.payload, covers)
         except UnwritableError as error:
             self._store.hold()
             self._builder.series = self._store.series
             built = self._builder.in_series(built)
-            self._store.add_version(number, built.begun, built.payload, self._covers)
+            self._store.add_version(number, built.begun, built.payload, covers)
             _log.error("%s; going on without it until there is room", error)
         return built
 

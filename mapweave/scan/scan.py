@@ -17,6 +17,9 @@ UNNUMBERED = -1
 MAX_STAMP = 1e11
 """[s]; an overflown clock says nothing, and the time is not known."""
 
+LONGEST_SWEEP = 1.0
+"""[s]; no lidar turns slower."""
+
 _TURN = 2 * math.pi
 _LAST_INDEX = 2**53  # that a file holds
 
@@ -114,17 +117,18 @@ class Scan:
         angle_increment
             From each beam to the next [rad]; negative for a sensor that turns clockwise.
         range_min, range_max
-            [m] readings below or above are no returns.
+            [m] readings below or above are no returns; a number that is no distance states nothing.
         index, stamp, odometry
             As of `Scan`.
         time_increment
-            From each beam to the next [s]; 0 where it is not known.
+            From each beam to the next [s]; 0 where it is not known. Where a sweep would take more
+            than `LONGEST_SWEEP` it is in another unit, and states nothing.
 
         Raises
         ------
         ArgumentError
-            If one of them is no number, the angles are not finite, the increment is zero, or the
-            beams go round more than once.
+            If one of them is no number, the angles are not finite, the increment is zero, nothing
+            is between the ranges, or the beams go round more than once.
 
         Examples
         --------
@@ -134,13 +138,14 @@ class Scan:
         first, step = _angle("angle_min", angle_min), _angle("angle_increment", angle_increment)
         if step == 0:
             raise ArgumentError("angle_increment", "expected an angle [rad] other than 0")
-        low = as_number("range_min", range_min, "expected a distance [m]")
-        high = as_number("range_max", range_max, "expected a distance [m]")
+        low, high = _span(range_min, range_max)
         given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
         used = np.where((given >= low) & (given <= high), given, np.nan)
         angles = first + step * np.arange(given.size, dtype=np.float64)
-        sweep = as_number("time_increment", time_increment, "expected a time [s]")
-        return cls(used, angles, index, stamp, odometry, sweep * max(given.size - 1, 0))
+        each = as_number("time_increment", time_increment, "expected a time [s]")
+        swept = each * max(given.size - 1, 0)
+        sweep = swept if abs(swept) <= LONGEST_SWEEP else 0.0
+        return cls(used, angles, index, stamp, odometry, sweep)
 
     @property
     def hits(self) -> BoolArray:
@@ -153,6 +158,16 @@ class Scan:
         bearing = np.column_stack([np.cos(self.angles), np.sin(self.angles)])
         points: FloatArray = self.ranges[:, None] * bearing
         return points
+
+
+def _span(range_min: float, range_max: float) -> tuple[float, float]:
+    """Return between which distances [m] something came back; ArgumentError if between none."""
+    low = as_number("range_min", range_min, "expected a distance [m]")
+    high = as_number("range_max", range_max, "expected a distance [m]")
+    low, high = low if low > 0 else 0.0, high if high > 0 else math.inf
+    if low >= high:
+        raise ArgumentError("range_max", f"expected more than range_min, {low:g} m, got {high:g} m")
+    return low, high
 
 
 def _of_one_length(ranges: ArrayLike, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import signal
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import pytest
 
+from mapweave.team.joint_builder import JointMapBuilder
+from mapweave_fusion_server.coordinator import CoordinatorParameters
+from mapweave_fusion_server.service import Service
 from mapweave_fusion_server.store import Store
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from tests.fusion_server.conftest import Found, MakeMap, Network, ServerProcess, StartServer
+
+
+NOT_YET = 1000.0  # [s] until the next version
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
@@ -80,3 +90,28 @@ def test_the_first_signal_publishes_what_is_pending(
         server.wait_for_log("a: 2 submaps")
         assert server.stop(signal.SIGTERM) == 0
     assert network.groups(watcher.next()) == [["a/0"], ["a/1"]]
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_what_waits_for_the_next_version_is_news_to_who_starts_again(
+    network: Network,
+    make_map: MakeMap,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    waits: bool,
+) -> None:
+    monkeypatch.setattr(JointMapBuilder, "has_more", waits)
+    stop = threading.Event()
+    parameters = CoordinatorParameters(min_interval=NOT_YET)
+    watcher = network.watcher()
+    with Store(tmp_path / "store.sqlite", network.team) as store, ThreadPoolExecutor(1) as thread:
+        service = Service(network.connect(), network.team, store, parameters)
+        served = thread.submit(service.run, stop.is_set)
+        try:
+            with network.robot("a") as a:
+                a.publish_map(make_map("a"))
+                assert watcher.next().version == 1
+                assert store.holds_news is waits
+        finally:
+            stop.set()
+        served.result()

@@ -1,6 +1,5 @@
 """Follows a team that runs until it is done, and says who is lost on the way."""
 
-import logging
 import time
 from collections.abc import Sequence
 
@@ -9,16 +8,14 @@ import zenoh
 from mapweave.errors import MapweaveError
 from mapweave_deploy.run.display import Display
 from mapweave_deploy.run.processes import ProcessGroup
-from mapweave_deploy.run.recorder import Recorder, is_done
-from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.asking import ask_robot_map
+from mapweave_deploy.run.recorder import Recorder, is_done, to_come
+from mapweave_protocol.link.asking import ask_for_what_is_valid
 from mapweave_protocol.link.inbox import Inbox
-from mapweave_protocol.wire.messages import MapMessage
+from mapweave_protocol.wire.messages import JointStatusMessage
+from mapweave_protocol.wire.queries import JointQuery
 
 POLL = 0.2  # [s] after which a dead process or the end is noticed
 CAPACITY = 100_000  # messages waiting to be counted
-
-_log = logging.getLogger(__name__)
 
 
 class TeamTimeoutError(MapweaveError):
@@ -65,7 +62,7 @@ class Follower:
         return [robot for robot in self._robots if robot not in self.lost]
 
     def follow(self, session: zenoh.Session, team: str) -> None:
-        """Follow until all robots that are not lost are done, and the coordinator has their maps.
+        """Follow until all robots that are not lost are done, and the coordinator is.
 
         Raises
         ------
@@ -77,11 +74,10 @@ class Follower:
         while not is_done(self.there, self.recorder.statuses):
             self._step()
             self._check_time(self._unfinished())
-        # The coordinator publishes what is pending when it is told to stop, so all that is left
-        # to see to is that it has got everybody's last map.
-        while missing := self._not_at_coordinator(session, team):
+        # Stopped, the coordinator has some seconds for what is left: so nothing may be.
+        while left := self._to_come(session, team):
             self._step()
-            self._check_time([f"map of {robot}" for robot in missing])
+            self._check_time(left)
 
     def drain(self) -> None:
         """Take in what has arrived."""
@@ -117,30 +113,13 @@ class Follower:
         finished = {robot for robot, status in statuses if status.state == "finished"}
         return [r for r in self.there if r not in finished] or ["comparing the last maps"]
 
-    def _not_at_coordinator(self, session: zenoh.Session, team: str) -> list[str]:
-        """Return the robots whose last map the coordinator has not got."""
-        missing = []
-        for robot in self.there:
-            status = self.recorder.statuses[robot]
-            held = _ask(session, team, robot)
-            is_last = held is not None and (held.boot, held.version) == (
-                status.boot,
-                status.map_version,
-            )
-            if not is_last and status.submaps > 0:
-                missing.append(robot)
-        return missing
+    def _to_come(self, session: zenoh.Session, team: str) -> list[str]:
+        """Return what the coordinator has yet to get, or to make."""
+        query = JointQuery(of="status")
+        said = ask_for_what_is_valid(session, team, query, JointStatusMessage)
+        return to_come(self.there, self.recorder.statuses, said)
 
 
 def agent_of(robot: str) -> str:
     """Return the name of a robot's process."""
     return f"agent {robot}"
-
-
-def _ask(session: zenoh.Session, team: str, robot: str) -> MapMessage | None:
-    """Return the coordinator's map of `robot`, None as well if the answer is not valid."""
-    try:
-        return ask_robot_map(session, team, robot)
-    except MessageError as error:
-        _log.warning("answer ignored, %s", error)
-        return None

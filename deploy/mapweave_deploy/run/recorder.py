@@ -1,6 +1,6 @@
 """Follows a team by its messages: what happens, what was sent, whether it is done."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -9,7 +9,7 @@ from mapweave_protocol.errors import ForeignKeyError
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.narration.watch import Watcher
 from mapweave_protocol.wire.keys import ALIGNMENT, MAP, POSE, STATUS, KeyFormat
-from mapweave_protocol.wire.messages import StatusMessage
+from mapweave_protocol.wire.messages import JointStatusMessage, MapVersion, StatusMessage
 
 KINDS = {"map": MAP, "alignment": ALIGNMENT, "pose": POSE, "status": STATUS}
 
@@ -75,6 +75,31 @@ def is_done(robots: list[str], statuses: Mapping[str, StatusMessage]) -> bool:
         _compared(statuses[a], statuses[b]) or _compared(statuses[b], statuses[a])
         for a, b in combinations(robots, 2)
     )
+
+
+def to_come(
+    robots: Sequence[str],
+    statuses: Mapping[str, StatusMessage],
+    coordinators: Sequence[JointStatusMessage],
+) -> list[str]:
+    """Return which last maps of `robots` no coordinator has, or that a joint map is being made.
+
+    Parameters
+    ----------
+    statuses
+        Of robots that are done, by their ids.
+    coordinators
+        What each says of itself; nothing where none answers.
+    """
+    held = {state for said in coordinators for state in said.maps}
+    last = {
+        robot: MapVersion(robot=robot, boot=status.boot, version=status.map_version)
+        for robot in robots
+        if (status := statuses[robot]).submaps > 0
+    }
+    missing = [f"map of {robot}" for robot, state in last.items() if state not in held]
+    making = any(said.pending for said in coordinators) or not coordinators
+    return missing or ["the last joint map"] * making
 
 
 def _compared(own: StatusMessage, peer: StatusMessage) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from mapweave.errors import FileError
 from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.io.readers import count_scans, read_reference_poses
+from mapweave.text import counted
 from mapweave_deploy.run.log_split import cut
 from mapweave_deploy.sim.simulation import RobotLog, simulate
 
@@ -65,7 +66,8 @@ def team_from_logs(logs: list[Path], robots: int) -> list[Member]:
     for log in logs:
         count = count_scans(log)
         if count < robots:
-            raise FileError(log, f"{count} scans, expected at least one for each robot ({robots})")
+            held = counted(count, "scan")
+            raise FileError(log, f"{held}, expected at least one for each robot ({robots})")
         index, pose = _truth(log)
         for scans in cut(count, robots):
             name = f"r{len(members) + 1}"

@@ -28,16 +28,20 @@ def write(some_map: RobotMap | JointMap, path: Path) -> None:
     if isinstance(some_map, JointMap):
         raise FileError(path, "a joint map holds no paths; expected a robot's map")
     scenes = robot_scenes(some_map)
-    scene = largest(scenes)
-    lines = [] if scene is None else [line for part in scene.paths for line in _lines(part)]
-    if scene is None or not lines:
+    paths = {
+        scene.name: [line for part in scene.paths for line in _lines(part)] for scene in scenes
+    }
+    driven = [scene for scene in scenes if paths[scene.name]]
+    # Of a robot that only follows in a stored map, the largest may be one where it never was.
+    scene = largest(driven) or max(driven, key=lambda each: len(paths[each.name]), default=None)
+    if scene is None:
         raise FileError(path, "no scan of the map has a stamp; expected some")
     left_out = ", ".join(other.name for other in scenes if other is not scene)
     head = [f"# component {scene.name}: stamp x y z qx qy qz qw"]
     if left_out:
         head.append(f"# left out, in frames of their own: {left_out}")
     with replace_file(path) as temporary:
-        temporary.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
+        temporary.write_text("\n".join([*head, *paths[scene.name]]) + "\n", encoding="utf-8")
 
 
 def _lines(part: ScenePath) -> list[str]:

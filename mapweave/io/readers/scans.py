@@ -76,8 +76,9 @@ def read_scans(
     Raises
     ------
     FileError
-        At once if there is no such file; while reading if it cannot be read, or has several lasers
-        of which none was named; at the end if there was no usable scan.
+        At once if there is no such file, or it is no bag and a topic is named; while reading if it
+        cannot be read, or has several lasers of which none was named; at the end if there was no
+        usable scan.
     MissingExtraError
         If it is a bag, and `rosbags` is not installed.
     """
@@ -89,7 +90,11 @@ def read_scans(
     if source.is_dir():
         return bag_folder.read(source, options)
     log.check_is_file(source)
-    return _format(source).read(source, options)
+    reader = _format(source)
+    asked = topic or which
+    if asked and reader not in BINARY_FORMATS:
+        raise FileError(source, f"is no bag, which alone has topics, such as {asked}")
+    return reader.read(source, options)
 
 
 def count_scans(

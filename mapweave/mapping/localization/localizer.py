@@ -262,14 +262,14 @@ class Localizer:
         if now - since < p.every:
             return
         self._place, self._candidate, self._unconfirmed = found, None, 0
-        self._tell(f"{self.robot} has found itself in component {found.component} of the map")
+        self._tell(f"the robot has found itself in component {found.component} of the map")
         self._path += [_located(step, found) for step in self._waiting]
         self._waiting = []
 
     def _lose(self) -> None:
         """Forget where the robot is: it may be anywhere."""
         if self._place is not None:
-            self._tell(f"{self.robot} no longer knows where in the map it is")
+            self._tell("the robot no longer knows where in the map it is")
         self._place, self._candidate, self._unconfirmed = None, None, 0
         self._outdated = self._searching is not None
         self._waiting = []

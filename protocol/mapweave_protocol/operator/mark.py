@@ -41,7 +41,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     if (options.at is None) != options.undo:
-        raise OrderError("expected --at, or --undo in its place")
+        raise OrderError("expected --at SCAN or --at=X,Y, or --undo in its place")
     with connected(options) as (session, team, name):
         if options.undo:
             orders = _undone(session, team, options, name)

@@ -2,11 +2,16 @@
 
 import pytest
 
-from mapweave_deploy.run.recorder import Recorder, is_done
+from mapweave_deploy.run.recorder import Recorder, is_done, to_come
 from mapweave_protocol.link.inbox import Arrival
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.keys import JOINT_MAP, STATUS
-from mapweave_protocol.wire.messages import Compared, StatusMessage
+from mapweave_protocol.wire.messages import (
+    Compared,
+    JointStatusMessage,
+    MapVersion,
+    StatusMessage,
+)
 
 
 def status(
@@ -65,6 +70,35 @@ def test_a_team_is_not_done_while_a_robot_maps_or_is_unheard(who: str) -> None:
     assert not is_done(["a", "b", "c"], {k: v for k, v in statuses.items() if k != who})
     statuses[who] = status(who, state="mapping", compared=dict.fromkeys("abc", 3))
     assert not is_done(["a", "b", "c"], statuses)
+
+
+def coordinator(*, pending: bool = False, **versions: int) -> JointStatusMessage:
+    """Return what a coordinator says that holds these versions of robots' maps."""
+    held = tuple(
+        MapVersion(robot=robot, boot=f"boot-{robot}", version=version)
+        for robot, version in versions.items()
+    )
+    return JointStatusMessage(
+        boot="boot", stamp=0.0, series="series", version=1, pending=pending, maps=held
+    )
+
+
+def test_a_team_waits_until_its_coordinator_has_all_last_maps_and_made_one_of_them() -> None:
+    robots = {name: status(name) for name in "ab"}
+
+    def left(*said: JointStatusMessage) -> list[str]:
+        return to_come("ab", robots, said)
+
+    assert left() == ["map of a", "map of b"]
+    assert left(coordinator(a=3, b=2)) == ["map of b"]
+    assert left(coordinator(a=3, b=3, pending=True)) == ["the last joint map"]
+    assert left(coordinator(a=3, b=3)) == []
+
+
+def test_a_robot_without_a_map_is_not_waited_for() -> None:
+    nowhere = status("a", submaps=0, map_version=0)
+    assert to_come("a", {"a": nowhere}, [coordinator()]) == []
+    assert to_come("a", {"a": nowhere}, []) == ["the last joint map"]
 
 
 def test_messages_and_bytes_are_counted_by_robot_and_kind() -> None:

@@ -36,6 +36,9 @@ def test_a_log_whose_poses_never_change_tells_no_truth(tmp_path: Path) -> None:
     assert len(member.truth_index) == len(member.truth_pose) == 0
 
 
-def test_a_log_with_fewer_scans_than_robots_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"2 scans, expected at least one for each robot \(3\)"):
-        team_from_logs([write_log(tmp_path / "short.log", 2)], 3)
+@pytest.mark.parametrize(("count", "said"), [(1, "1 scan"), (2, "2 scans")])
+def test_a_log_with_fewer_scans_than_robots_is_refused(
+    count: int, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(FileError, match=rf"{said}, expected at least one for each robot \(3\)"):
+        team_from_logs([write_log(tmp_path / "short.log", count)], 3)

@@ -112,7 +112,7 @@ def test_a_mark_is_taken_back_by_its_label_and_survives_a_restart_until_then(
     [
         (("mark", "b", "victim", "--at", "99"), "--at: scan 99 is not in the map of b"),
         (("mark", "b/7", "victim", "--at", "1"), "no coordinator of team T has a map of b/7"),
-        (("mark", "b", "victim"), "expected --at, or --undo in its place"),
+        (("mark", "b", "victim"), "expected --at SCAN or --at=X,Y, or --undo in its place"),
         (("mark", "b", "victim", "--undo"), "no operator's mark 'victim' on the map of b is"),
         (("pin", "a/0", "b/0", "--reason", "so"), "no coordinator of team T has a map of a/0"),
         (("forbid", "b/0", "b/0", "--reason", "so"), "b/0: expected two components"),

@@ -86,7 +86,7 @@ def test_a_log_is_followed_in_a_stored_map_that_stays_as_it_is(
     output = tmp_path / "path.json"
     done = mapweave("map", log, "--scans", "10:40", "--localize", first, "--output", output)
     assert done.returncode == 0
-    assert done.stderr == "mapweave: r1 has found itself in component 0 of the map\n"
+    assert done.stderr == "mapweave: the robot has found itself in component 0 of the map\n"
     assert done.stdout.startswith("30 of 30 scans placed")
     known, found = read_map(first), read_map(output)
     for then, now in zip(known.submaps, found.submaps, strict=False):

@@ -1,6 +1,7 @@
 """What other programs get is what the map holds."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from mapweave.errors import FileError
 from mapweave.io.export import EXPORT_SUFFIXES, export
 from mapweave.io.exporters.geojson import DECIMALS
 from mapweave.io.map_files import write_joint, write_map
-from mapweave.maps import JointMap, LineMap, RobotMap
+from mapweave.maps import JointMap, LineMap, RobotMap, Trajectory
 from mapweave.pictures.scene import robot_scenes
 from tests.mapweave.whole_maps import joint_map, robot_map, true_poses
 
@@ -165,6 +166,20 @@ def test_a_grid_or_a_path_of_nothing_is_refused(suffix: str, tmp_path: Path) -> 
         with pytest.raises(FileError, match="expected"):
             export(nothing, path)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("walls", [0, 1])
+def test_a_path_is_of_where_the_robot_drove_also_where_no_wall_is_of_its_own(
+    walls: int, rng: Generator, tmp_path: Path
+) -> None:
+    stored, driven = robot_map(rng, components=(0, 1, 1)).submaps[:2]
+    stored = replace(stored, trajectory=Trajectory.empty())
+    driven = replace(driven, map=LineMap.empty())
+    path = tmp_path / "driven.tum"
+    export(RobotMap("a", "boot", 0, (stored, driven)[1 - walls :]), path)
+    head, *lines = path.read_text().splitlines()
+    assert head.startswith("# component a/1")
+    assert sum(not line.startswith("#") for line in lines) == len(driven.trajectory.stamp)
 
 
 @pytest.mark.parametrize("suffix", DRAWINGS)

@@ -202,6 +202,20 @@ def test_without_odometry_the_poses_in_a_log_change_nothing(data_dir: Path, tmp_
         np.testing.assert_array_equal(one.points, other.points)
 
 
+@pytest.mark.parametrize("asked", [{"topic": "/scan"}, {"odometry": "/odom"}])
+@pytest.mark.parametrize(
+    "content", [FLASER, b'{"angle_min": 0, "angle_increment": 1, "ranges": []}']
+)
+def test_a_topic_of_what_is_no_bag_is_refused(
+    content: bytes, asked: dict[str, str], tmp_path: Path
+) -> None:
+    path = tmp_path / "log"
+    path.write_bytes(content)
+    (topic,) = asked.values()
+    with pytest.raises(FileError, match=f"log: is no bag, which alone has topics, such as {topic}"):
+        read_scans(path, topic=asked.get("topic"), odometry=asked.get("odometry", False))
+
+
 def test_an_odometry_that_is_not_finite_is_none(tmp_path: Path) -> None:
     (scan,) = read_text(tmp_path, FLASER.replace(b"3 4 0.25", b"nan 4 0.25"), odometry=True)
     assert scan.odometry is None

@@ -64,6 +64,22 @@ def test_readings_out_of_the_drivers_range_are_no_returns() -> None:
     assert scan.stamp == 7.0
 
 
+@pytest.mark.parametrize("nothing", [0.0, -1.0, -math.inf])
+def test_a_bound_that_is_no_distance_states_nothing(nothing: float) -> None:
+    assert Scan.of([0.01, 1.0, 30.0], 0.0, 0.1, range_min=nothing, range_max=nothing).hits.all()
+
+
+@pytest.mark.parametrize("highest", [1.0, 5.0])
+def test_bounds_with_nothing_between_them_are_refused(highest: float) -> None:
+    with pytest.raises(ArgumentError, match=r"^range_max: expected more than range_min, 5 m, got"):
+        Scan.of([2.0, 3.0], 0.0, 0.1, range_min=5.0, range_max=highest)
+
+
+@pytest.mark.parametrize(("stated", "sweep"), [(0.5, 1.0), (-0.5, -1.0), (0.51, 0.0), (1e6, 0.0)])
+def test_a_sweep_of_more_than_a_second_is_not_believed(stated: float, sweep: float) -> None:
+    assert Scan.of([1.0, 2.0, 3.0], 0.0, 0.1, time_increment=stated).sweep == sweep
+
+
 def test_a_scan_cannot_be_changed_and_changes_with_nothing() -> None:
     ranges, angles = np.array([1.0, 2.0]), np.array([0.0, 0.1])
     scan = Scan(ranges, angles)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
-LONGEST_SWEEP = 1.0  # [s] no lidar turns slower
 ROS1, CDR = "ros1", "cdr"
 """The encodings of ROS 1 and of ROS 2."""
 
@@ -116,10 +115,5 @@ def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
         range_min=laser.range_min if laser.range_min > 0 else 0.0,  # also where it is NaN
         index=index,
         stamp=stamp.sec + stamp.nanosec * 1e-9,
-        time_increment=_increment(laser.time_increment, len(measured)),
+        time_increment=laser.time_increment if laser.time_increment > 0 else 0.0,
     )
-
-
-def _increment(stated: float, beams: int) -> float:
-    """Return [s] from beam to beam; 0 where what is stated is no time that a sweep takes."""
-    return float(stated) if 0 < stated * beams <= LONGEST_SWEEP else 0.0

@@ -163,8 +163,8 @@ def test_a_place_that_is_not_confirmed_again_and_again_is_given_up_and_said() ->
     searcher = Scripted([HERE] * 5)
     localizer = Localizer(known, searcher=searcher, on_news=news.append)
     found = follow(localizer, scans_along(BUILDING, FROM_THE_LEFT, 7)[0])
-    assert news[0] == "r1 has found itself in component 2 of the map"
-    assert news[1] == "r1 no longer knows where in the map it is"
+    assert news[0] == "the robot has found itself in component 2 of the map"
+    assert news[1] == "the robot no longer knows where in the map it is"
     assert not found[-1].placed
     patience = localizer.parameters.patience
     given_up = next(k for k, s in enumerate(searcher.searches) if k > 6 and s.near is None)
