@@ -29,7 +29,12 @@ class BackendProcess(Worker):
 
     def begin(self, finished: FinishedSubmap) -> None:
         """Hand the next submap over."""
-        self._ask(finished)
+        if self._ended:
+            return
+        try:
+            self._pipe.send(finished)
+        except (BrokenPipeError, ConnectionResetError):
+            self._tell_end()
 
     @property
     def is_ready(self) -> bool:
@@ -41,26 +46,11 @@ class BackendProcess(Worker):
         if self._ended:
             return None
         try:
-            settled: BackendResult | None = self._pipe.recv()
+            settled: BackendResult = self._pipe.recv()
         except (EOFError, ConnectionResetError):
             self._tell_end()
             return None
         return settled
-
-    def restart(self) -> bool:
-        """Begin anew there; it always does, and is waited for."""
-        self._ask(None)
-        self.take()
-        return True
-
-    def _ask(self, finished: FinishedSubmap | None) -> None:
-        """Send a submap to be settled, or None for the process to begin anew."""
-        if self._ended:
-            return
-        try:
-            self._pipe.send(finished)
-        except (BrokenPipeError, ConnectionResetError):
-            self._tell_end()
 
     def _tell_end(self) -> None:
         self._ended = True
@@ -73,12 +63,4 @@ class BackendProcess(Worker):
 
 def _serve(pipe: Connection, known: tuple[BackendParameters, tuple[Submap, ...]]) -> None:
     """Settle what comes through `pipe` until its other end is closed."""
-    backend = Backend(*known)
-
-    def settled(finished: FinishedSubmap | None) -> BackendResult | None:
-        if finished is None:
-            backend.restart()
-            return None
-        return backend.settle(finished)
-
-    answer(pipe, NICENESS, settled)
+    answer(pipe, NICENESS, Backend(*known).settle)

@@ -118,33 +118,20 @@ class BackendRunner(Protocol):
     def take(self) -> BackendResult | None:
         """Wait for the outcome and return it; None if there is none."""
 
-    def restart(self) -> bool:
-        """Forget all but what was known at first: all is mapped again, and settled anew.
-
-        The outcome of the last submap must have been taken. Returns whether it does so.
-        """
-
 
 class Backend:
     """Settles at once, where it is called; `known` are submaps to go on from, ids from 0."""
 
     def __init__(self, parameters: BackendParameters, known: Sequence[Submap] = ()) -> None:
         self._parameters = parameters
-        self._known = tuple(known)
-        self.restart()
-
-    def restart(self) -> bool:
-        """Begin anew; it always does."""
-        parameters = self._parameters
-        self._submaps = list(self._known)
-        self._component_merger = ComponentMerger(parameters.component_merging, len(self._known))
+        self._submaps = list(known)
+        self._component_merger = ComponentMerger(parameters.component_merging, len(known))
         self._fragments = FragmentFinder(parameters.fragments)
         self._loops = LoopCloser(parameters.loops)
-        self._loops.graph.take_over(self._known)
+        self._loops.graph.take_over(known)
         self._kidnap_detector = KidnapDetector(parameters.kidnapping)
         self._tracked = 0  # how many of the last submaps were tracked from one another
         self._settled: BackendResult | None = None
-        return True
 
     def begin(self, finished: FinishedSubmap) -> None:
         """Settle the next submap."""

@@ -19,7 +19,6 @@ from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, 
 from mapweave.mapping.continuation import first_component, marks_to_continue, scans_in, to_continue
 from mapweave.mapping.map_snapshot import Draw, MapSnapshot, Unsettled, draw_here, with_walls
 from mapweave.mapping.placement import Placement
-from mapweave.mapping.raw_scans import RawScans
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.deskewing import Deskewer
@@ -39,7 +38,6 @@ from mapweave.scan.own_body import OwnBody, OwnBodyParameters
 from mapweave.scan.scan import UNNUMBERED, Scan
 
 AT_ONCE = 2  # scans that wait are placed with each one that comes: a loss holds nobody up
-AGAIN = 3  # submaps' worth of scans that may be mapped once more; live, one: the next scan waits
 SUSPENSE = 24  # times the patience, while it is open whether a robot sees itself
 
 
@@ -116,8 +114,8 @@ class Mapper:
         as_configured = self.parameters == MapperParameters.of(config)
         self._made_with = MadeWith.of(config) if as_configured else None
         self._version = 0
-        self._known = to_continue(known)  # submaps of an earlier run
-        self._finished = list(self._known)
+        self._finished = list(to_continue(known))
+        self._known = len(self._finished)  # submaps, of an earlier run
         self._marks = marks_to_continue(known)
         self._component = self._newest_component = first_component(self._finished)
         self._on_warning = on_warning
@@ -125,7 +123,8 @@ class Mapper:
         self._body = OwnBody(self.parameters.own_body)
         # Scans to be placed: the last, and after a loss those that were missed before it.
         self._waiting: deque[Observation] = deque()
-        self._early = RawScans(self.parameters.backend.submap.max_scans * (1 if live else AGAIN))
+        # Raw scans so far, as long as no submap is finished.
+        self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._sweeps = SweepJudge(self.parameters.sweeps)
         self._tracker = Tracker(self.parameters.tracker, self._sweeps)
         self._loss = Loss(self.parameters.patience)
@@ -173,11 +172,11 @@ class Mapper:
         check_kind("scan", scan, Scan)
         scan = self._numbered(scan)
         finished = len(self._finished)
-        is_news = self._body.watch(scan) or self._sweeps.take_news()
-        again = is_news and self._judge_again()
+        if self._body.watch(scan) or self._sweeps.take_news():
+            self._judge_again()
         placed, lost = self._take(scan)
         pose, uncertainty = self._whereabouts() if placed else (None, None)
-        submap_finished = len(self._finished) > (len(self._known) if again else finished)
+        submap_finished = len(self._finished) > finished
         return Placement(placed, self._component, submap_finished, lost, pose, uncertainty)
 
     def finish(self) -> RobotMap:
@@ -222,7 +221,7 @@ class Mapper:
     @property
     def _has_finished(self) -> bool:
         """Whether a submap of this run is finished."""
-        return len(self._finished) > len(self._known)
+        return len(self._finished) > self._known
 
     def _numbered(self, scan: Scan) -> Scan:
         """Return `scan` with its index, which may be the next; errors as of `add`."""
@@ -240,7 +239,8 @@ class Mapper:
 
     def _take(self, scan: Scan) -> tuple[bool, bool]:
         """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
-        self._early.add(scan)
+        if not self._has_finished:
+            self._early.append(scan)
         straight = self._deskewer.straight(self._sweeps.swept(self._body.without(scan)))
         seen = self.seen = observe(straight, self.parameters.observation)
         self._waiting.append(seen)
@@ -274,19 +274,17 @@ class Mapper:
         undecided &= not self._tracker.is_blind(seen)
         return self.parameters.patience * (SUSPENSE if undecided else 1)
 
-    def _judge_again(self) -> bool:
+    def _judge_again(self) -> None:
         """Map all there is once more, as it is now known what of it is the robot's own body.
 
-        Or how long its sweeps take. Where the scans are no longer there, or the backend does not
-        settle anything anew, what is mapped stays as it is. Returns whether all was mapped again.
+        Or how long its sweeps take. What is in a finished submap stays as it is.
         """
         self._say_body()
         self._say_sweep()
-        if not self._early.are_whole:
-            return False
-        if self._has_finished and not self._forget_finished():
-            return False
-        early = self._early.take()
+        if self._has_finished:
+            return
+        early = list(self._early)
+        self._early.clear()
         self._waiting.clear()
         self._tracker = Tracker(self.parameters.tracker, self._sweeps)
         self._loss = Loss(self.parameters.patience)
@@ -297,20 +295,6 @@ class Mapper:
         self._version += 1
         for scan in early:
             self._take(scan)
-        return True
-
-    def _forget_finished(self) -> bool:
-        """Begin with the known submaps again; return whether the backend does.
-
-        The first component keeps its number: its frame is that of the same scan. Others get numbers
-        that were never given: who remembers what was said of one never takes another place for it.
-        """
-        self._adopt_settled()
-        if not self._backend.restart():
-            return False
-        self._finished = list(self._known)
-        self._component, self._follows = first_component(self._finished), False
-        return True
 
     def _say_body(self) -> None:
         """Tell once that the robot sees itself."""

@@ -52,16 +52,3 @@ def test_without_the_process_submaps_stay_as_tracked(scans: list[Scan]) -> None:
         found = mapper.finish()
     placed = np.concatenate([s.trajectory.scan_index for s in found.submaps])
     assert sorted(placed) == list(range(len(scans)))
-
-
-def test_a_process_that_begins_anew_knows_nothing_of_what_it_settled(scans: list[Scan]) -> None:
-    with BackendProcess(PARAMETERS.backend) as backend:
-        found = []
-        for _ in range(2):
-            mapper = Mapper("a", parameters=PARAMETERS, backend=backend)
-            for scan in scans:
-                mapper.add(scan)
-            found.append([s.pose for s in mapper.finish().submaps])
-            assert backend.restart()
-    assert len(found[0]) > 2
-    np.testing.assert_array_equal(found[0], found[1])

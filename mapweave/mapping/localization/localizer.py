@@ -82,10 +82,6 @@ class _TrackedOnly:
     def take(self) -> None:
         """There is no outcome."""
 
-    def restart(self) -> bool:
-        """Not: what was tracked is where it was located in the known map."""
-        return False
-
 
 class Localizer:
     """Follows one robot through a known map, scan by scan; it adds nothing to that map.

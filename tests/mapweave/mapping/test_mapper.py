@@ -335,11 +335,6 @@ class JoinsAll:
         poses = np.array([s.pose for s in self._submaps])
         return BackendResult(np.zeros(len(poses), dtype=np.int64), poses, (self._submaps[-1],), 0)
 
-    def restart(self) -> bool:
-        """Begin anew."""
-        self._submaps = []
-        return True
-
 
 def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> None:
     """Who remembers what was said of component 1 never takes another place for it."""
@@ -414,11 +409,6 @@ class CutsTheSecond:
     def take(self) -> BackendResult | None:
         """Return where all are."""
         return self._settled
-
-    def restart(self) -> bool:
-        """Begin anew."""
-        self._submaps, self._settled = [], None
-        return True
 
 
 def test_a_submap_that_is_cut_and_a_robot_that_is_lost_meanwhile_share_no_number() -> None:

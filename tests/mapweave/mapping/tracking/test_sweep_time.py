@@ -6,17 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapweave.config import Config, Mapping
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.backend import BackendRunner, FinishedSubmap
 from mapweave.mapping.mapper import Mapper, MapperParameters
 from mapweave.mapping.tracking.observation import ObservationParameters, observe
 from mapweave.mapping.tracking.sweep_time import SweepParameters, set_right
-from mapweave.maps import RobotMap, Submap
 from mapweave.scan.scan import Scan
-from tests.mapweave.buildings import BUILDING, OTHER_BUILDING, cast, walls_of
-from tests.mapweave.mapping.drives import tracks
+from tests.mapweave.buildings import BUILDING, cast, walls_of
 from tests.mapweave.mapping.tracking.test_deskewing import FRONT, swept
 
 RATE = 10.0  # [Hz]
@@ -52,17 +48,13 @@ def mapped(found: list[Scan], say: Callable[[str], None] | None = None) -> Mappe
     return mapper
 
 
-def worst_turn(robot_map: RobotMap) -> float:
-    """[rad] by which headings are off, of scans that were all placed in one component."""
-    ((index, poses),) = tracks(robot_map)
-    true = np.array([looking_about(k / RATE) for k in index])
-    return float(np.ptp(se2.wrap(poses[:, 2] - true[:, 2])))
-
-
-def in_submaps_of(count: int, backend: BackendRunner | None = None) -> Mapper:
-    """Return a mapper whose submaps are finished after so many scans."""
-    config = Config(mapping=Mapping(submap_scans=count))
-    return Mapper(config=config, backend=backend, parameters=MapperParameters.of(config))
+def worst_turn(mapper: Mapper) -> float:
+    """[rad] by which headings are off, of scans that were all placed in one submap."""
+    (submap,) = mapper.finish().submaps
+    path = submap.trajectory
+    true = np.array([looking_about(k / RATE) for k in path.scan_index])
+    off = se2.wrap(path.pose[:, 2] + submap.pose[2] - true[:, 2])
+    return float(np.ptp(off))
 
 
 @pytest.mark.parametrize("sweep", [ONCE, -ONCE], ids=["counter-clockwise", "clockwise"])
@@ -84,66 +76,7 @@ def test_what_was_mapped_before_a_sweep_was_known_is_mapped_once_more() -> None:
     silent = Mapper(parameters=MapperParameters(sweeps=SweepParameters(enough=1000)))
     for scan in found:
         silent.add(scan)
-    assert worst_turn(mapped(found).finish()) < 0.5 * worst_turn(silent.finish())
-
-
-def test_finished_submaps_are_mapped_once_more_as_well() -> None:
-    mapper, finished = in_submaps_of(15), 0
-    for scan in scans(ONCE, 60):
-        known = mapper._sweeps.sweep != 0.0
-        finished = finished if known else len(mapper.robot_map().submaps) - 1
-        mapper.add(scan)
-    assert finished >= 2
-    again = mapper.finish()
-    assert [s.id for s in again.submaps] == list(range(len(again.submaps)))
-    assert sorted(k for s in again.submaps for k in s.trajectory.scan_index) == list(range(60))
-    stated = in_submaps_of(15)
-    for scan in scans(ONCE, 60):
-        stated.add(replace(scan, sweep=ONCE))
-    assert worst_turn(again) < 1.1 * worst_turn(stated.finish())
-
-
-class Stays:
-    """Leaves submaps as they were tracked, and does not begin anew."""
-
-    is_ready = True
-
-    def begin(self, finished: FinishedSubmap) -> None:
-        """Nothing is settled."""
-
-    def take(self) -> None:
-        """There is no outcome."""
-
-    def restart(self) -> bool:
-        """Not."""
-        return False
-
-
-def test_where_nothing_is_settled_anew_finished_submaps_stay_as_they_are() -> None:
-    mapper, finished = in_submaps_of(15, Stays()), list[Submap]()
-    for scan in scans(ONCE, 60):
-        finished = finished if mapper._sweeps.sweep else list(mapper.robot_map().submaps[:-1])
-        mapper.add(scan)
-    assert len(finished) >= 2
-    for before, after in zip(finished, mapper.finish().submaps, strict=False):
-        np.testing.assert_array_equal(before.trajectory.pose, after.trajectory.pose)
-
-
-def test_components_that_are_mapped_once_more_take_numbers_that_were_never_given() -> None:
-    """Who remembers what was said of component 1 never takes another place for it."""
-    elsewhere = cast(walls_of(OTHER_BUILDING), np.array([5.0, 1.5, 0.0]), angles=FRONT)
-    away = [replace(elsewhere, index=k, stamp=k / RATE) for k in range(12)]
-    here = [replace(s, index=12 + s.index, stamp=s.stamp + 1.2) for s in scans(ONCE, 60)]
-    mapper, given = in_submaps_of(15), set[int]()
-    for scan in [*away, *here]:
-        is_known = mapper._sweeps.sweep != 0.0
-        component = mapper.add(scan).component
-        given |= set() if is_known else {component}
-    first, *others = mapper.finish().components
-    assert first == 0
-    assert others
-    assert len(given) > 1
-    assert min(others) > max(given)
+    assert worst_turn(mapped(found)) < 0.5 * worst_turn(silent)
 
 
 def test_a_sweep_that_a_scan_states_is_not_asked_for() -> None:
