@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "point_cell.hpp"
 #include "sectors.hpp"
 
 namespace point_map {
@@ -20,6 +19,13 @@ constexpr double kTurn = 6.283185307179586476925286766559;
 constexpr double kHalfTurn = kTurn / 2;
 
 inline double wrap(double angle) { return angle - kTurn * std::ceil((angle - kHalfTurn) / kTurn); }
+
+struct Point {
+  double x, y, u, v;  // place [m], normal times its weight [m]
+  double nx, ny;      // unit normal
+  int64_t number;     // in the order of adding
+  int32_t tag;        // polyline, -1 for none
+};
 
 struct Known {
   double x, y, nx, ny;
@@ -126,9 +132,9 @@ class PointMap {
     for (Point& point : fresh) {  // afterwards: a block's own points do not thin each other
       point.number = first_ + static_cast<int64_t>(known_.size());
       reach_out(point.x, point.y);
-      Cell& here = cells_[cell_of(point.x, point.y)];
+      std::vector<Point>& here = cells_[cell_of(point.x, point.y)];
       if (here.empty()) tell_around(index(point.x) - left_, index(point.y) - low_);
-      here.add(point);
+      here.push_back(point);
       known_.push_back({point.x, point.y, point.nx, point.ny, block_});
       seen_in_.back().push_back(point.number);
       sample(point.number);
@@ -149,7 +155,7 @@ class PointMap {
       const double* m = normals.data() + 2 * i;
       const Point* found = nearest(p[0], p[1], weight_ * m[0], weight_ * m[1], reach);
       if (!found) continue;
-      distance[i] = std::sqrt(found->squared(p[0], p[1], weight_ * m[0], weight_ * m[1]));
+      distance[i] = std::sqrt(squared(*found, p[0], p[1], weight_ * m[0], weight_ * m[1]));
       number[i] = found->number;
     }
     return std::make_tuple(give(std::move(distance), {n}), give(std::move(number), {n}));
@@ -273,7 +279,7 @@ class PointMap {
   std::deque<Known> known_;                             // by number, from first_ on
   std::deque<std::vector<int64_t>> seen_in_ = {{}};     // numbers seen in each of the last blocks
   int64_t left_ = 0, low_ = 0, columns_ = 0, rows_ = 0;  // the cells there are
-  std::vector<Cell> cells_;
+  std::vector<std::vector<Point>> cells_;
   std::vector<uint8_t> empty_;  // rings about each cell, itself the first, that hold no point for sure
   mutable std::vector<Known> sampled_;  // of the points that are there, those with a multiple of `every_`, if it is set
   mutable std::vector<int64_t> numbers_;  // of these
@@ -318,6 +324,11 @@ class PointMap {
     return poses.shape(0);
   }
 
+  static double squared(const Point& q, double x, double y, double u, double v) {
+    const double dx = q.x - x, dy = q.y - y, du = q.u - u, dv = q.v - v;
+    return dx * dx + dy * dy + (du * du + dv * dv);
+  }
+
   int64_t index(double value) const { return static_cast<int64_t>(std::floor(value / cell_)); }
   size_t cell_of(double x, double y) const {
     return static_cast<size_t>((index(x) - left_) * rows_ + (index(y) - low_));
@@ -354,7 +365,7 @@ class PointMap {
 
   void lay_out(int64_t left, int64_t low, int64_t columns, int64_t rows) {
     if (columns > kMaxCells / rows) throw std::invalid_argument("points: spread over too wide an area");
-    std::vector<Cell> cells(static_cast<size_t>(columns * rows));
+    std::vector<std::vector<Point>> cells(static_cast<size_t>(columns * rows));
     for (int64_t i = 0; i < columns_; ++i)
       for (int64_t j = 0; j < rows_; ++j) {
         const int64_t a = i + left_ - left, b = j + low_ - low;
@@ -386,7 +397,8 @@ class PointMap {
       if (known.seen != oldest) continue;
       known.seen = -1;
       gone.push_back(number);
-      cells_[cell_of(known.x, known.y)].remove(number);
+      auto& here = cells_[cell_of(known.x, known.y)];
+      here.erase(std::find_if(here.begin(), here.end(), [&](const Point& p) { return p.number == number; }));
       --count_;
     }
     sample_less(gone);
@@ -414,7 +426,7 @@ class PointMap {
     const int64_t a0 = std::max(i - r, left_), a1 = std::min(i + r, left_ + columns_ - 1);
     const int64_t b0 = std::max(j - r, low_), b1 = std::min(j + r, low_ + rows_ - 1);
     for (int64_t a = a0; a <= a1; ++a) {
-      const Cell* column = cells_.data() + (a - left_) * rows_ - low_;
+      const std::vector<Point>* column = cells_.data() + (a - left_) * rows_ - low_;
       if (a == i - r || a == i + r) {
         for (int64_t b = b0; b <= b1; ++b) visit(column[b], a, b);
       } else {
@@ -441,7 +453,7 @@ class PointMap {
     double best = reach * reach, next = std::numeric_limits<double>::infinity();
     const Point* found = nullptr;
     if (guess) {
-      const double d = guess->squared(x, y, u, v);
+      const double d = squared(*guess, x, y, u, v);
       if (d < best) best = d, found = guess;
     }
     const int64_t farthest = std::max(std::max(i - left_, left_ + columns_ - 1 - i),
@@ -452,21 +464,28 @@ class PointMap {
         next = std::min(next, gap * gap);
         break;
       }
-      ring(i, j, r, [&](const Cell& here, int64_t a, int64_t b) {
+      ring(i, j, r, [&](const std::vector<Point>& here, int64_t a, int64_t b) {
         if (here.empty()) return;
         const double gap_x = gap_to(x, a), gap_y = gap_to(y, b), nearest_here = gap_x * gap_x + gap_y * gap_y;
         if (nearest_here > best) {
           next = std::min(next, nearest_here);
           return;
         }
-        here.within(x, y, u, v, next, [&](const Point& q, double d) {  // others change neither
-          if (&q == found) return;
-          if (d < best || (d == best && found && q.number < found->number)) {
-            next = best, best = d, found = &q;
-          } else {
-            next = d;
+        // No branches but for equals: which point is nearer than those before is a toss.
+        for (const Point& q : here) {
+          const double d = squared(q, x, y, u, v);
+          if (d == best) {
+            if (&q == found) continue;
+            next = best;
+            if (found && q.number < found->number) found = &q;
+            continue;
           }
-        });
+          const bool nearer = d < best;
+          const double other = nearer ? best : d;
+          next = other < next ? other : next;
+          best = nearer ? d : best;
+          found = nearer ? &q : found;
+        }
       });
     }
     return {found, next};
@@ -490,7 +509,8 @@ class PointMap {
     const int64_t j0 = std::max(index(y - wide), low_), j1 = std::min(index(y + wide), low_ + rows_ - 1);
     for (int64_t i = i0; i <= i1; ++i)
       for (int64_t j = j0; j <= j1; ++j)
-        if (cells_[(i - left_) * rows_ + (j - low_)].any_within(x, y, u, v, limit)) return true;
+        for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)])
+          if (squared(q, x, y, u, v) < limit) return true;
     return false;
   }
 
@@ -539,7 +559,7 @@ class PointMap {
           throw std::invalid_argument("corresponding: smaller than the polylines named");
         if (!corresponding->data()[q->tag * corresponding->shape(1) + tags[i]]) continue;
       }
-      const double pull = 1 + q->squared(x, y, u, v) / (scale * scale);
+      const double pull = 1 + squared(*q, x, y, u, v) / (scale * scale);
       const double w = 1 / (pull * pull);
       support += w;
       const double residual = q->nx * (x - q->x) + q->ny * (y - q->y);
