@@ -320,6 +320,7 @@ class AgentRun:
         message = self._map.marks.message()
         self._outbox.send_marks(message)
         self._state.keep_marks(message)
+        self._publication.hurry()  # a mark is nowhere until the scan that holds it is told
 
     def _publish_status(self) -> None:
         self._outbox.send_status(self._status())

@@ -21,7 +21,7 @@ from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.past_runs import StateFolder
-from mapweave_agent.publication_schedule import AgentParameters
+from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.coding.trajectory_code import PER_METRE
@@ -196,6 +196,36 @@ def test_scans_are_mapped_while_the_agent_is_held_up_with_everything_else(
         held_up.set()
     assert told[-1] == SCANS - 1
     assert agent.skipped == 0
+
+
+def test_what_holds_a_mark_is_told_at_once_however_little_was_driven(
+    endpoint: str, team: str, logs: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PublicationSchedule, "due", lambda plan, _: plan._urgent)
+    told = list[int]()
+    with open_session([endpoint], patience=PATIENCE) as session:
+        listener = Listener(session, team)
+        with mapweave_agent.Agent(
+            "a",
+            team,
+            connect=endpoint,
+            patience=PATIENCE,
+            on_pose=lambda p: told.append(p.scan_index),
+        ) as agent:
+            for scan in scans_of(logs[0]):
+                agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+                while agent.waiting:
+                    time.sleep(0.005)
+            listener.until(lambda: SCANS - 1 in told)
+            agent.mark("victim", 1.0, 0.0, frame="sensor")
+            listener.until(
+                lambda: "a" in listener.maps and last_scan(listener.maps["a"]) == SCANS - 1
+            )
+            assert not listener.finished("a")
+
+
+def last_scan(robot_map: RobotMap) -> int:
+    return int(robot_map.submaps[-1].trajectory.scan_index[-1])
 
 
 def test_what_fails_beside_the_mapping_ends_the_agent(
