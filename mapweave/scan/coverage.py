@@ -1,14 +1,16 @@
 """What of the region was searched, and where it goes on: explored area, and frontiers.
 
-A frontier is where free space ends and no wall is near: beyond it nobody has looked. Both follow
-from a line map alone, so whoever has the map has them.
+A frontier is where free space ends, no wall is near, and a robot would fit in what lies beyond:
+there nobody has looked. Shadows of chairs and cracks between cupboards are none. All of it follows
+from a line map alone, so whoever has the map has it.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
@@ -17,6 +19,9 @@ from mapweave.geometry.segments import near_intervals
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.free_space import from_rings
+
+Lines: TypeAlias = NDArray[np.object_]  # of shapely
+STOPS = 8  # of a disc that rolls along an edge, on its diameter's length
 
 
 class CoverageParameters(StageParameters):
@@ -31,7 +36,13 @@ class CoverageParameters(StageParameters):
     min_width: float = Field(
         0.8,
         gt=0,
-        description="[m] of an opening from wall to wall, as a narrow door: less is no way on",
+        description="[m] that a way on has at least, from wall to wall or from free to free, as a"
+        " narrow door and what drives through it",
+    )
+    tolerance: float = derived(
+        lambda c: c.mapping.resolution,
+        ge=0,
+        description="[m] by which walls and outlines may lie too near for that: a cell",
     )
 
 
@@ -89,15 +100,43 @@ def coverage(lines: LineMap, parameters: CoverageParameters | None = None) -> Co
     edges = _edges(free)
     open_ends = _chains(edges, _away_from(lines.segments, edges.segments, p.reach))
     merged = shapely.get_parts(shapely.line_merge(shapely.MultiLineString(open_ends)))
-    parts = [part for part in merged if _width(part, p.reach) >= p.min_width]
-    parts.sort(key=lambda part: -part.length)
-    frontiers = tuple(np.array(part.coords, dtype=np.float64) for part in parts)
+    obstacles = shapely.linestrings(np.vstack([lines.segments, edges.segments]).reshape(-1, 2, 2))
+    wide = merged[_widths(merged, p.reach) >= p.min_width]
+    ways_on = wide[_fits_beyond(wide, free, shapely.STRtree(obstacles), p)]
+    longest_first = ways_on[np.argsort(-shapely.length(ways_on), kind="stable")]
+    frontiers = tuple(shapely.get_coordinates(way) for way in longest_first)
     return Coverage(float(free.area), frontiers)
 
 
-def _width(part: shapely.LineString, reach: float) -> float:
-    """[m] of the opening in which a frontier is: to the walls by which both its ends are."""
-    return float(part.length if part.is_closed else part.length + 2 * reach)
+def _widths(parts: Lines, reach: float) -> FloatArray:
+    """[m] of the openings in which frontiers are: to the walls by which both their ends are."""
+    length: FloatArray = shapely.length(parts)
+    return length + np.where(shapely.is_closed(parts), 0.0, 2 * reach)
+
+
+def _fits_beyond(
+    parts: Lines, free: BaseGeometry, obstacles: shapely.STRtree, p: CoverageParameters
+) -> BoolArray:
+    """Return for each of (k,) `parts` of outlines whether a disc as wide as a way fits beyond it.
+
+    It rolls along the part, on the side that is not `free`, and must meet no obstacle.
+    """
+    stops = shapely.segmentize(parts, p.min_width / STOPS)
+    corners, owner = shapely.get_coordinates(stops, return_index=True)
+    step, touched = np.diff(corners, axis=0), (corners[1:] + corners[:-1]) / 2
+    length = np.hypot(*step.T)
+    rolls = (owner[1:] == owner[:-1]) & (length > 0)
+    owner, touched = owner[1:][rolls], touched[rolls]
+    aside = np.column_stack([-step[:, 1], step[:, 0]])[rolls] / length[rolls, None]
+    fits = np.zeros(len(parts), dtype=bool)
+    for radius in (-p.min_width / 2, p.min_width / 2):
+        middle = touched + radius * aside
+        stands = ~shapely.contains_xy(free, *middle.T)
+        discs = shapely.points(middle)
+        met, _ = obstacles.query(discs, predicate="dwithin", distance=abs(radius) - p.tolerance)
+        stands[met] = False
+        fits[owner[stands]] = True
+    return fits
 
 
 def _edges(free: BaseGeometry) -> _Edges:

@@ -45,7 +45,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "ComponentMergingParameters": {},
     "ContradictionParameters": {},
     "CorrelativeParameters": {"cell": 0.1, "reach": 1.2},
-    "CoverageParameters": {"reach": 0.35},
+    "CoverageParameters": {"reach": 0.35, "tolerance": 0.1},
     "DecisionParameters": {"min_confidence": 0.85},
     "DistanceFieldParameters": {"cell": 0.1, "spacing": 0.2},
     "DriftParameters": {"shift": 0.5, "reach": 0.15, "forgotten": 0.05},

@@ -67,6 +67,15 @@ def plan_tours(world: World, robots: int, parameters: TourParameters, rng: Gener
     return [drive(_smooth(world, paths[k], parameters.radius), parameters) for k in chosen]
 
 
+def tour_through(world: World, stops: FloatArray, parameters: TourParameters) -> Tour:
+    """Return the tour to (k, 2) `stops` [m] in their order, each as near as the robot fits."""
+    grid = make_grid(world, parameters.radius)
+    cells = grid.nearest(stops)
+    _, before = grid.ways_from(cells)
+    path = _path(grid, before, cells, list(range(len(cells))), np.inf)
+    return drive(_smooth(world, path, parameters.radius), parameters)
+
+
 def _random_order(costs: FloatArray, length: float, rng: Generator) -> list[int]:
     """Return stops to visit one after the other, each a near one not visited yet.
 

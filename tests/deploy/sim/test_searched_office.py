@@ -4,11 +4,17 @@ import numpy as np
 import pytest
 import shapely
 
+from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.mapping.mapper import Mapper
 from mapweave.maps import LineMap
 from mapweave.scan.coverage import coverage
 from mapweave.scan.free_space import FreeSpaceParameters, rings, unite
-from mapweave_deploy.sim.office import ROOMS, Room, office
+from mapweave.scan.scan import Scan
+from mapweave_deploy.sim.office import GLASS, ROOMS, Room, office
+from mapweave_deploy.sim.sweeps import SweepParameters, sweeps
+from mapweave_deploy.sim.trajectories import TourParameters, tour_through
+from mapweave_deploy.sim.world import World
 
 KEPT = 0.15  # [m] that free space keeps from walls
 DOORS = [room.door(*door) for room in ROOMS for door in room.doors]
@@ -18,6 +24,7 @@ WITH_ONE_DOOR = [
     if room.doors and sum(door.intersects(room.inside) for door in DOORS) == 1
 ]
 SEEDS = range(1, 4)
+ROUNDS = 4  # of driving where the search goes on
 
 
 def searched(seed: int, *left_out: Room) -> list[FloatArray]:
@@ -50,3 +57,70 @@ def test_one_door_that_was_left_out_is_the_one_frontier(seed: int) -> None:
         wall = {"n": room.y2, "s": room.y1, "e": room.x2, "w": room.x1}[side]
         assert abs((y if side in "ns" else x) - wall) < 0.3
         assert first < along < last
+
+
+def left(world: World, stops: FloatArray) -> list[FloatArray]:
+    """Return the frontiers over 0.5 m, in the world's frame, of a drive to (k, 2) `stops` [m]."""
+    tour = tour_through(world, stops, TourParameters())
+    p = SweepParameters()
+    readings = sweeps(world, tour, p, np.random.default_rng(1), np.random.default_rng(2))
+    mapper = Mapper("r1")
+    for index, (ranges, stamp) in enumerate(zip(readings, tour.stamp, strict=True)):
+        usable = ranges < p.lidar.maximum_range
+        mapper.add(Scan(np.where(usable, ranges, np.inf), p.lidar.angles, index, float(stamp)))
+    [first, *_] = (found := mapper.finish()).submaps
+    start = se2.compose(first.pose, first.trajectory.pose[0])
+    to_world = se2.compose(tour.pose[0], se2.inverse(start))
+    frontiers = coverage(found.lines(0)).frontiers
+    placed = [se2.transform_points(to_world, frontier) for frontier in frontiers]
+    return [frontier for frontier in placed if length(frontier) > 0.5]
+
+
+def length(line: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def nearest_first(stops: FloatArray) -> FloatArray:
+    """Return (k, 2) `stops` in an order to drive them: from each to the nearest that is left."""
+    order = [0]
+    while len(order) < len(stops):
+        away = np.linalg.norm(stops - stops[order[-1]], axis=1)
+        away[order] = np.inf
+        order.append(int(np.argmin(away)))
+    return stops[order]
+
+
+def searched_by_driving(world: World, stops: FloatArray, *left_out: Room) -> list[FloatArray]:
+    """Return what is left, but at windows, where a robot went on to all that is not `left_out`."""
+    stops = nearest_first(stops)
+    not_there = shapely.union_all([room.inside.buffer(0.5) for room in left_out])
+    for _ in range(ROUNDS):
+        found = [f for f in left(world, stops) if shapely.distance(line(f), GLASS) > 0.5]
+        to_see = [f.mean(axis=0) for f in found if not shapely.intersects(not_there, line(f))]
+        if not to_see:
+            break
+        stops = np.vstack([stops, nearest_first(np.array([stops[-1], *to_see]))])
+    return found
+
+
+def line(points: FloatArray) -> shapely.LineString:
+    return shapely.LineString(points)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_robot_that_drives_where_the_search_goes_on_leaves_nothing_but_windows(seed: int) -> None:
+    """Nothing comes back from glass: nobody knows that the building ends there."""
+    world = office(seed)
+    assert searched_by_driving(world, world.stops) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_room_that_the_robot_drove_past_is_where_the_search_goes_on(seed: int) -> None:
+    world = office(seed)
+    room = WITH_ONE_DOOR[3]
+    elsewhere = ~shapely.contains_xy(room.inside, *world.stops.T)
+    found = searched_by_driving(world, world.stops[elsewhere], room)
+    behind = room.inside.buffer(0.5)
+    assert found and all(shapely.intersects(behind, line(frontier)) for frontier in found)

@@ -55,7 +55,7 @@ def test_a_door_of_the_usual_width_is_one_as_well(door: float) -> None:
 def test_what_stands_in_a_room_and_is_too_small_for_walls_is_no_way_on() -> None:
     """A hole in free space, of which nothing was made but returns."""
     outside = [[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]]
-    for size, ways in ((0.15, 0), (0.5, 1)):
+    for size, ways in ((0.15, 0), (0.5, 0), (1.0, 1)):
         low, high = 2.0, 2.0 + size
         halves = [
             [*outside[:2], [6.0, high], [high, high], [high, low], [low, low], [0.0, low]],
@@ -68,6 +68,19 @@ def test_what_stands_in_a_room_and_is_too_small_for_walls_is_no_way_on() -> None
             [0.0, 4.0, 0.0, 0.0],
         ]
         assert len(coverage(line_map(walls, *halves)).frontiers) == ways
+
+
+@pytest.mark.parametrize(("width", "ways"), [(0.5, 0), (1.0, 2)])
+def test_the_shadow_of_a_thing_leads_on_only_where_a_robot_fits_into_it(
+    width: float, ways: int
+) -> None:
+    """Of a thing in a room, seen from one side: its two edges lead on, or none of them."""
+    low, high = 2 - width / 2, 2 + width / 2
+    walls = [[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 4.0], [6.0, 4.0, 0.0, 4.0], [0.0, 4.0, 0.0, 0.0]]
+    thing, right = [3.0, low, 3.0, high], 6 - KEPT
+    seen = [[KEPT, KEPT], [right, KEPT], [right, low], [3.0, low]]
+    seen += [[3.0, high], [right, high], [right, 4 - KEPT], [KEPT, 4 - KEPT]]
+    assert len(coverage(line_map([*walls, thing], seen)).frontiers) == ways
 
 
 def test_a_gap_that_is_too_narrow_for_a_robot_is_none() -> None:
