@@ -54,6 +54,8 @@ class Sample:
         (m, 2) points along its walls in that frame, 0.15 m apart [m].
     middle
         (2,) of its walls, its own frame [m].
+    submap
+        It.
     """
 
     log: str
@@ -62,6 +64,7 @@ class Sample:
     walls: FloatArray
     middle: FloatArray
     shape: PlaceShape
+    submap: Submap
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
         sample
         for log in logs
         for count in options.stretches
-        for sample in _samples(log.name, log.building, count, index)
+        for sample in samples_of(log.name, log.building, count, index)
     ]
     fillers = _fillers(options.submaps - len(samples), index)
     for log in logs:
@@ -159,7 +162,7 @@ def _fillers(count: int, index: PlaceIndex[Key]) -> list[tuple[Key, PlaceShape]]
     return found
 
 
-def _samples(name: str, building: str, count: int, index: PlaceIndex[Key]) -> list[Sample]:
+def samples_of(name: str, building: str, count: int, index: PlaceIndex[Key]) -> list[Sample]:
     """Map a log in stretches; return all submaps with enough wall to have a shape."""
     log = find_logs([name])[0]
     truth = load_truth(log, np.array([scan.stamp for scan in load_scans(log)]))
@@ -182,7 +185,7 @@ def _sample(
     frame = true_frame(path, truth)
     walls = se2.transform_points(frame, points_on_lines(submap.map, SPACING)[0].points)
     middle = submap.map.segments.reshape(-1, 2).mean(axis=0)
-    return Sample(log, key, frame, walls, middle, index.prepare(submap.map))
+    return Sample(log, key, frame, walls, middle, index.prepare(submap.map), submap)
 
 
 def _look_up(
@@ -205,13 +208,13 @@ def _look_up(
         index.add(key, shape, key[:2])
     rows = []
     for sample in own:
-        shared = _shared_with(sample, own)
+        shared = shared_with(sample, own)
         if shared.max(initial=0.0) >= SHARED:
             rows.append(_row(sample, shared, index, known))
     return rows
 
 
-def _shared_with(sample: Sample, own: Sequence[Sample]) -> FloatArray:
+def shared_with(sample: Sample, own: Sequence[Sample]) -> FloatArray:
     """(n,) [m] of wall in common with each submap of another stretch."""
     if not np.isfinite(sample.frame[0]):
         return np.empty(0)

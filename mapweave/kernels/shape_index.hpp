@@ -147,15 +147,18 @@ class ShapeIndex {
                                                             double turn) const {
     if (static_cast<int64_t>(allowed.shape(0)) != size() || middle.shape(0) != 2 || count < 0 || budget < 0)
       throw std::invalid_argument("allowed (slots,), middle (2,), count and budget >= 0 expected");
-    std::vector<size_t> start(count_.size() + 1, 0);
+    start_.assign(count_.size() + 1, 0);
     votes_.clear();
-    for (const auto& asked : rarest(words, kind, budget))
+    for (size_t rank = 0, rare = rarest(words, kind, budget); rank < rare; ++rank) {
+      const Asked& asked = asked_[order_[rank].second];
       for (int k = 0; k < asked.count; ++k)
         for (const Word& w : buckets_[asked.bucket[k]])
           if (allowed(w.slot) && alive_[w.slot])
-            vote(k < asked.forward ? asked.word : reversed(asked.word), w, asked.weight, middle.data(), start);
-    sort_by_slot(start);
-    return best(start, middle.data(), static_cast<size_t>(count), distance, turn);
+            vote(k < asked.forward ? asked.word : reversed(asked.word), w, asked.weight, middle.data());
+    }
+    sort_by_slot();
+    lead(4 * static_cast<size_t>(count));
+    return best(middle.data(), static_cast<size_t>(count), distance, turn);
   }
 
  private:
@@ -167,6 +170,8 @@ class ShapeIndex {
     int count, forward;
     std::array<int32_t, 16> bucket;
   };
+
+  using Leader = std::pair<double, uint64_t>;  // votes and key of a cell
 
   static size_t check(const In<double, 2>& words, const In<int64_t, 1>& kind) {
     if (words.shape(1) != 6 || kind.shape(0) != words.shape(0))
@@ -230,10 +235,9 @@ class ShapeIndex {
     }
   }
 
-  // The words that are found least often, as long as all they find is within the budget.
-  std::vector<Asked> rarest(const In<double, 2>& words, const In<int64_t, 1>& kind, int64_t budget) const {
-    std::vector<Asked> all;
-    all.reserve(words.shape(0));
+  // Looks words up, and puts those first that are found least often; returns how many of these are within the budget.
+  size_t rarest(const In<double, 2>& words, const In<int64_t, 1>& kind, int64_t budget) const {
+    asked_.clear();
     for (size_t k = 0; k < check(words, kind); ++k) {
       Asked asked{};
       if (!packed(words.data() + 6 * k, 0, asked.word)) continue;
@@ -242,23 +246,20 @@ class ShapeIndex {
       look_up(reversed(asked.word), (kind(k) & 1) << 1 | kind(k) >> 1, asked);
       if (asked.found == 0) continue;
       asked.weight = std::log1p(static_cast<double>(total_) / static_cast<double>(asked.found));
-      all.push_back(asked);
+      asked_.push_back(asked);
     }
-    std::vector<std::pair<int64_t, size_t>> order(all.size());
-    for (size_t k = 0; k < all.size(); ++k) order[k] = {all[k].found, k};
-    std::sort(order.begin(), order.end());
-    std::vector<Asked> kept;
-    int64_t sum = 0;
-    for (const auto& [found, k] : order) {
-      if ((sum += found) > budget) break;
-      for (int n = 0; n < all[k].count; ++n) __builtin_prefetch(buckets_[all[k].bucket[n]].data());
-      kept.push_back(all[k]);
+    order_.clear();
+    for (size_t k = 0; k < asked_.size(); ++k) order_.emplace_back(asked_[k].found, k);
+    std::sort(order_.begin(), order_.end());
+    size_t kept = 0;
+    for (int64_t sum = 0; kept < order_.size() && (sum += order_[kept].first) <= budget; ++kept) {
+      const Asked& asked = asked_[order_[kept].second];
+      for (int n = 0; n < asked.count; ++n) __builtin_prefetch(buckets_[asked.bucket[n]].data());
     }
     return kept;
   }
 
-  void vote(const Word& ours, const Word& theirs, double weight, const double* middle,
-            std::vector<size_t>& start) const {
+  void vote(const Word& ours, const Word& theirs, double weight, const double* middle) const {
     if (std::abs(ours.apart - theirs.apart) > length_tolerance_) return;
     const int turned = static_cast<int16_t>(theirs.baseline - ours.baseline);
     const int one = static_cast<int16_t>(theirs.first - ours.first - turned);
@@ -273,15 +274,15 @@ class ShapeIndex {
     votes_.push_back({theirs.slot, floor_of(x), floor_of(y), static_cast<int16_t>(step),
                      static_cast<int16_t>(step * cell_turns_ / kSteps), static_cast<float>(x), static_cast<float>(y),
                      static_cast<float>(weight)});
-    ++start[theirs.slot + 1];
+    ++start_[theirs.slot + 1];
   }
 
-  // Puts the votes for each map together, in their order; `start` becomes where each begins.
-  void sort_by_slot(std::vector<size_t>& start) const {
-    std::partial_sum(start.begin(), start.end(), start.begin());
+  // Puts the votes for each map together, in their order; `start_` becomes where each begins.
+  void sort_by_slot() const {
+    std::partial_sum(start_.begin(), start_.end(), start_.begin());
     sorted_.resize(votes_.size());
-    std::vector<size_t> next(start.begin(), start.end() - 1);
-    for (const Vote& vote : votes_) sorted_[next[vote.slot]++] = vote;
+    next_.assign(start_.begin(), start_.end() - 1);
+    for (const Vote& vote : votes_) sorted_[next_[vote.slot]++] = vote;
   }
 
   int32_t floor_of(double x) const { return static_cast<int32_t>(std::floor(x / cell_)) + 32768; }
@@ -330,36 +331,34 @@ class ShapeIndex {
           cell_key(slot, x + k / 9 - 1, y + k / 3 % 3 - 1, (turn + k % 3 - 1 + cell_turns_) % cell_turns_));
   }
 
-  // The cells that are the most voted by themselves, together with those beside them.
-  std::vector<Cell> led(const std::vector<size_t>& start, size_t most) const {
-    using Leader = std::pair<double, uint64_t>;
-    std::vector<Leader> heap;  // the least of them first
-    const auto weaker = [](const Leader& a, const Leader& b) {
-      return a.first != b.first ? a.first > b.first : a.second < b.second;
-    };
-    for (size_t slot = 0; slot + 1 < start.size(); ++slot) {
-      if (start[slot] == start[slot + 1]) continue;
-      count_votes(start, slot);
-      for (const Cell& cell : ballot_.cells) {
-        if (heap.size() == most && (most == 0 || !weaker({cell.votes, cell.key}, heap.front()))) continue;
-        if (heap.size() == most) std::pop_heap(heap.begin(), heap.end(), weaker), heap.pop_back();
-        heap.emplace_back(cell.votes, cell.key);
-        std::push_heap(heap.begin(), heap.end(), weaker);
-      }
+  // Finds the cells that are the most voted by themselves, and sums each with those beside it.
+  void lead(size_t most) const {
+    leaders_.clear();
+    for (size_t slot = 0; slot + 1 < start_.size(); ++slot) {
+      if (start_[slot] == start_[slot + 1]) continue;
+      count_votes(slot);
+      for (const Cell& cell : ballot_.cells) leaders_.emplace_back(cell.votes, cell.key);
     }
-    std::sort(heap.begin(), heap.end(), [](const Leader& a, const Leader& b) { return a.second < b.second; });
-    std::vector<Cell> sums;
-    for (size_t k = 0; k < heap.size(); ++k) {
-      if (k == 0 || heap[k].second >> 40 != heap[k - 1].second >> 40) count_votes(start, heap[k].second >> 40);
-      sums.push_back(gathered(heap[k].second));
+    if (leaders_.size() > most) {
+      std::nth_element(leaders_.begin(), leaders_.begin() + static_cast<std::ptrdiff_t>(most), leaders_.end(),
+                       [](const Leader& a, const Leader& b) {
+                         return a.first != b.first ? a.first > b.first : a.second < b.second;
+                       });
+      leaders_.resize(most);
     }
-    return sums;
+    std::sort(leaders_.begin(), leaders_.end(), [](const Leader& a, const Leader& b) { return a.second < b.second; });
+    sums_.clear();
+    for (size_t k = 0; k < leaders_.size(); ++k) {
+      const uint64_t slot = leaders_[k].second >> 40;
+      if (k == 0 || slot != leaders_[k - 1].second >> 40) count_votes(slot);
+      sums_.push_back(gathered(leaders_[k].second));
+    }
   }
 
   // Counts the votes for one map.
-  void count_votes(const std::vector<size_t>& start, size_t slot) const {
-    ballot_.clear(start[slot + 1] - start[slot]);
-    for (size_t k = start[slot]; k < start[slot + 1]; ++k) count_vote(sorted_[k], ballot_);
+  void count_votes(size_t slot) const {
+    ballot_.clear(start_[slot + 1] - start_[slot]);
+    for (size_t k = start_[slot]; k < start_[slot + 1]; ++k) count_vote(sorted_[k], ballot_);
   }
 
   void count_vote(const Vote& vote, Ballot& ballot) const {
@@ -374,19 +373,18 @@ class ShapeIndex {
 
   static bool before(const Cell& a, const Cell& b) { return a.votes != b.votes ? a.votes > b.votes : a.key < b.key; }
 
-  std::tuple<Out<int64_t>, Out<double>, Out<double>> best(const std::vector<size_t>& start, const double* middle,
-                                                          size_t count, double distance, double turn) const {
-    std::vector<Cell> leaders = led(start, 4 * count);
+  std::tuple<Out<int64_t>, Out<double>, Out<double>> best(const double* middle, size_t count, double distance,
+                                                          double turn) const {
     const auto after = [](const Cell& a, const Cell& b) { return before(b, a); };
-    std::make_heap(leaders.begin(), leaders.end(), after);  // not all of them are wanted
+    std::make_heap(sums_.begin(), sums_.end(), after);  // not all of them are wanted
     std::vector<int64_t> slots;
     std::vector<double> transforms, votes;
     std::vector<std::array<double, 3>> kept;
-    std::vector<size_t> older, newest(start.size(), kNone);  // of the places that are kept, those of one map
-    while (slots.size() < count && !leaders.empty()) {
-      std::pop_heap(leaders.begin(), leaders.end(), after);
-      const Cell cell = leaders.back();
-      leaders.pop_back();
+    std::vector<size_t> older, newest(start_.size(), kNone);  // of the places that are kept, those of one map
+    while (slots.size() < count && !sums_.empty()) {
+      std::pop_heap(sums_.begin(), sums_.end(), after);
+      const Cell cell = sums_.back();
+      sums_.pop_back();
       const double x = cell.x / cell.votes, y = cell.y / cell.votes, theta = std::atan2(cell.sine, cell.cosine);
       const size_t slot = cell.key >> 40;
       bool differs = true;
@@ -415,7 +413,14 @@ class ShapeIndex {
   std::vector<int64_t> count_;
   std::vector<uint8_t> alive_;
   int64_t total_ = 0, dead_ = 0;
-  mutable std::vector<Vote> votes_, sorted_;  // of the last query: their room is used again
+  // Of the last query: their room is used again. Among thousands of buckets that grew the heap is in pieces, and
+  // room that is asked for anew took a quarter of a query.
+  mutable std::vector<Vote> votes_, sorted_;
+  mutable std::vector<size_t> start_, next_;
+  mutable std::vector<Asked> asked_;
+  mutable std::vector<std::pair<int64_t, size_t>> order_;
+  mutable std::vector<Leader> leaders_;
+  mutable std::vector<Cell> sums_;
   mutable Ballot ballot_;
 };
 

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view, score_views
+from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view, place_views
 from mapweave.kernels.matching.rasters import cell_codes
 from mapweave.kernels.matching.shape_index import Found, IndexSettings, shape_index
 from mapweave.maps import LineMap
@@ -107,9 +107,9 @@ class PlaceIndex(Generic[Key]):
                 *(p.turn_tolerance, p.cell, p.cell_turns),
             )
         )
+        self._views = place_views()
         self._slots: dict[Key, int] = {}
         self._keys: list[Key | None] = []
-        self._views: list[PlaceView | None] = []
         self._owners: dict[Hashable, int] = {}
         self._owner: IntArray = np.full(64, NOBODY)  # of each slot, and room for more
         self._table = _worth(p.verification)
@@ -137,7 +137,7 @@ class PlaceIndex(Generic[Key]):
         slot = self._words.add(shape.words.words, shape.words.kind)
         self._slots[key] = slot
         self._keys.append(key)
-        self._views.append(shape.view)
+        self._views.add(shape.view)
         if slot >= len(self._owner):
             self._owner = np.concatenate([self._owner, np.full(len(self._owner), NOBODY)])
         self._owner[slot] = self._owners.setdefault(owner, len(self._owners))
@@ -147,7 +147,8 @@ class PlaceIndex(Generic[Key]):
         slot = self._slots.pop(key, None)
         if slot is not None:
             self._words.remove(slot)
-            self._keys[slot] = self._views[slot] = None
+            self._views.remove(slot)
+            self._keys[slot] = None
             self._owner[slot] = NOBODY
 
     def query(self, shape: PlaceShape, count: int = 5, *, but: Hashable = None) -> list[Place[Key]]:
@@ -160,14 +161,12 @@ class PlaceIndex(Generic[Key]):
         """
         p, (slots, transforms, votes) = self._p, self._voted(shape, but)
         # By few samples first: what is voted most is many times what is worth a closer look.
-        rough = self._scores(shape, slots, transforms, p.stride)
-        kept = np.argsort(-rough, kind="stable")[: round(p.scored * self._more())]
-        scores = self._scores(shape, slots[kept], transforms[kept], 1)
-        ranked = np.argsort(-scores, kind="stable")[:count]
-        named = [(self._keys[slots[kept[k]]], k, kept[k]) for k in ranked.tolist()]
+        looked_at = p.stride, round(p.scored * self._more()), count
+        best, scores = self._views.best(shape.view, slots, transforms, self._table, *looked_at)
+        named = [(self._keys[slots[k]], k, score) for k, score in zip(best, scores, strict=True)]
         return [
-            Place(key, transforms[place], float(scores[k]), float(votes[place]))
-            for key, k, place in named
+            Place(key, transforms[k], float(score), float(votes[k]))
+            for key, k, score in named
             if key is not None
         ]
 
@@ -190,13 +189,6 @@ class PlaceIndex(Generic[Key]):
         those looked at. What both saw tells it as before, once it is among those scored.
         """
         return float(max(len(self) / self._p.usual, 1.0) ** self._p.growth)
-
-    def _scores(
-        self, shape: PlaceShape, slots: IntArray, transforms: FloatArray, stride: int
-    ) -> FloatArray:
-        """(n,) what both maps say of each place [m]."""
-        views = [view for slot in slots.tolist() if (view := self._views[slot]) is not None]
-        return score_views(shape.view, views, transforms, self._table, stride)
 
 
 def _view(lines: LineMap, p: PlaceIndexParameters) -> PlaceView:

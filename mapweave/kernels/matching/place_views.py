@@ -3,16 +3,16 @@
 Cheap enough for hundreds of candidates; what is best of them is judged finely elsewhere.
 """
 
-from collections.abc import Sequence
 from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapweave.kernels.arrays import FloatArray
+from mapweave.kernels.arrays import FloatArray, IntArray
 from mapweave.kernels.loading import COMPILED
 
 Codes = NDArray[np.uint8]
+Best = tuple[IntArray, FloatArray]
 
 
 class PlaceView(Protocol):
@@ -58,42 +58,99 @@ def place_view(codes: Codes, origin: FloatArray, cell: float, samples: FloatArra
     return cast("PlaceView", make(codes, origin, cell, samples))
 
 
-def score_views_numpy(
-    other: PlaceViewNumpy,
-    views: Sequence[PlaceViewNumpy],
-    transforms: FloatArray,
-    table: FloatArray,
-    stride: int,
-) -> FloatArray:
-    """Twin of `score_views`."""
-    scores = np.empty(len(views))
-    for k, (view, t) in enumerate(zip(views, transforms, strict=True)):
-        c, s = np.cos(t[2]), np.sin(t[2])
-        back = np.array([-c * t[0] - s * t[1], s * t[0] - c * t[1], -t[2]])
-        both = view.worth(other, t, table, stride) + other.worth(view, back, table, stride)
-        scores[k] = stride * both / 2
-    return scores
+class PlaceViews(Protocol):
+    """The views of many maps, as both the compiled class and its twin hold them."""
+
+    def add(self, view: PlaceView) -> int:
+        """Take the view of one more map; return its slot, counted from 0."""
+
+    def remove(self, slot: int) -> None:
+        """Forget a view; its slot is not given again. ValueError if it has none."""
+
+    def best(
+        self,
+        other: PlaceView,
+        slots: IntArray,
+        transforms: FloatArray,
+        table: FloatArray,
+        stride: int,
+        kept: int,
+        count: int,
+    ) -> Best:
+        """Return which of n places are best, at most `count`, and what both maps say of each.
+
+        That is the mean of what the walls of each count in the other.
+
+        Parameters
+        ----------
+        other
+            The map that is looked for.
+        slots, transforms
+            (n,) the maps it may be in, (n, 3) the transforms to them [m, m, rad].
+        table
+            (codes, directions) what a metre of wall counts in a cell of each code, by its
+            direction.
+        stride
+            Places are scored roughly first, by each such sample, which stands for those between.
+        kept
+            How many of them are scored by all samples, those best roughly.
+        """
 
 
-def score_views(
-    other: PlaceView,
-    views: Sequence[PlaceView],
-    transforms: FloatArray,
-    table: FloatArray,
-    stride: int = 1,
-) -> FloatArray:
-    """Return (n,) what each of `views` and `other` say of transforms between them, their mean.
+def place_views() -> PlaceViews:
+    """Return a store of nothing."""
+    make = PlaceViewsNumpy if COMPILED is None else COMPILED.PlaceViews
+    return cast("PlaceViews", make())
 
-    Parameters
-    ----------
-    transforms
-        (n, 3) from `other` to each view [m, m, rad].
-    table
-        (codes, directions) what a metre of wall counts in a cell of each code, by its direction.
-    stride
-        Which samples are looked up: each, every second and so on; those stand for the others.
-    """
-    if COMPILED is None:
-        twins = cast("list[PlaceViewNumpy]", [other, *views])
-        return score_views_numpy(twins[0], twins[1:], transforms, table, stride)
-    return cast("FloatArray", COMPILED.score_views(other, list(views), transforms, table, stride))
+
+class PlaceViewsNumpy:
+    """Twin of the compiled class."""
+
+    def __init__(self) -> None:
+        self._views: list[PlaceViewNumpy | None] = []
+
+    def add(self, view: PlaceViewNumpy) -> int:
+        """See `PlaceViews`."""
+        self._views.append(view)
+        return len(self._views) - 1
+
+    def remove(self, slot: int) -> None:
+        """See `PlaceViews`."""
+        self._at(slot)
+        self._views[slot] = None
+
+    def best(
+        self,
+        other: PlaceViewNumpy,
+        slots: IntArray,
+        transforms: FloatArray,
+        table: FloatArray,
+        stride: int,
+        kept: int,
+        count: int,
+    ) -> Best:
+        """See `PlaceViews`."""
+        views = [self._at(slot) for slot in slots.tolist()]
+        places = list(zip(views, transforms, strict=True))
+        rough = np.array([_of_both(other, view, t, table, stride) for view, t in places])
+        best = np.argsort(-rough, kind="stable")[:kept]
+        closer = (places[k] for k in best.tolist())
+        scores = np.array([_of_both(other, view, t, table, 1) for view, t in closer])
+        ranked = np.argsort(-scores, kind="stable")[:count]
+        return best[ranked], scores[ranked]
+
+    def _at(self, slot: int) -> PlaceViewNumpy:
+        view = self._views[slot] if 0 <= slot < len(self._views) else None
+        if view is None:
+            raise ValueError("slot: of a map expected")
+        return view
+
+
+def _of_both(
+    other: PlaceViewNumpy, view: PlaceViewNumpy, t: FloatArray, table: FloatArray, stride: int
+) -> float:
+    """Return what `view` and `other` say of a transform (3,) between them, the mean of both."""
+    c, s = np.cos(t[2]), np.sin(t[2])
+    back = np.array([-c * t[0] - s * t[1], s * t[0] - c * t[1], -t[2]])
+    both = view.worth(other, t, table, stride) + other.worth(view, back, table, stride)
+    return stride * both / 2

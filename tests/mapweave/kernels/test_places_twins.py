@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mapweave.kernels.arrays import FloatArray, IntArray
 from mapweave.kernels.loading import COMPILED
-from mapweave.kernels.matching.place_views import Codes, PlaceViewNumpy, score_views_numpy
+from mapweave.kernels.matching.place_views import Codes, PlaceViewNumpy, PlaceViewsNumpy
 from mapweave.kernels.matching.rasters import cell_codes, cell_codes_numpy
 from mapweave.kernels.matching.shape_index import Found, IndexSettings, ShapeIndexNumpy
 from mapweave.kernels.matching.shifts import best_shifts_numpy
@@ -63,30 +63,64 @@ def test_the_index_finds_what_its_twin_does(seed: int, count: int, budget: int) 
         np.testing.assert_allclose(a, b, atol=1e-3)
 
 
-@compiled
-@settings(max_examples=30, deadline=None)
-@given(seeds)
-def test_views_score_as_their_twins_do(seed: int) -> None:
-    assert COMPILED is not None
-    rng = np.random.default_rng(seed)
-    table = rng.normal(size=(5, 8))
-    parts = [
+Parts = tuple[Codes, FloatArray, float, FloatArray]
+
+
+def some_views(rng: np.random.Generator, count: int) -> list[Parts]:
+    """Return what views are made of: five codes."""
+    return [
         (
             rng.integers(0, 5, (12, 9)).astype(np.uint8),
             rng.uniform(-2, 0, 2),
             0.2,
             np.column_stack([rng.uniform(-1, 1, (30, 2)), rng.uniform(0, 1, (30, 2))]),
         )
-        for _ in range(4)
+        for _ in range(count)
     ]
-    motions = np.column_stack([rng.normal(size=(3, 2)), rng.uniform(-np.pi, np.pi, 3)])
-    ours, twins = [COMPILED.PlaceView(*p) for p in parts], [PlaceViewNumpy(*p) for p in parts]
-    for stride in (1, 4):
-        np.testing.assert_allclose(
-            COMPILED.score_views(ours[0], ours[1:], motions, table, stride),
-            score_views_numpy(twins[0], twins[1:], motions, table, stride),
-            atol=1e-9,
-        )
+
+
+@compiled
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.sampled_from([1, 4]), st.sampled_from([0, 3, 12, 100]))
+def test_the_best_places_are_those_of_the_twin(seed: int, stride: int, kept: int) -> None:
+    assert COMPILED is not None
+    rng = np.random.default_rng(seed)
+    parts, table = some_views(rng, 5), rng.normal(size=(5, 8))
+    ours, theirs = COMPILED.PlaceViews(), PlaceViewsNumpy()
+    for part in parts[1:]:
+        assert ours.add(COMPILED.PlaceView(*part)) == theirs.add(PlaceViewNumpy(*part))
+    ours.remove(1)
+    theirs.remove(1)
+    slots = rng.choice([0, 2, 3], 40)
+    motions = np.column_stack([rng.normal(size=(40, 2)), rng.uniform(-np.pi, np.pi, 40)])
+    asked = slots, motions, table, stride, kept, 10
+    found = ours.best(COMPILED.PlaceView(*parts[0]), *asked)
+    expected = theirs.best(PlaceViewNumpy(*parts[0]), *asked)
+    np.testing.assert_array_equal(found[0], expected[0])
+    np.testing.assert_allclose(found[1], expected[1], atol=1e-9)
+    assert len(found[0]) == min(kept, 10)
+
+
+def stores() -> list[tuple[type, type]]:
+    twins: list[tuple[type, type]] = [(PlaceViewsNumpy, PlaceViewNumpy)]
+    return twins if COMPILED is None else [*twins, (COMPILED.PlaceViews, COMPILED.PlaceView)]
+
+
+@pytest.mark.parametrize(("make", "view"), stores())
+def test_of_a_view_that_is_forgotten_nothing_is_told(make: type, view: type) -> None:
+    rng = np.random.default_rng(1)
+    one, other = (view(*part) for part in some_views(rng, 2))
+    store = make()
+    slot = store.add(one)
+    motions, table = np.zeros((1, 3)), np.ones((5, 8))
+    asked = other, np.array([slot]), motions, table, 1, 5, 5
+    assert len(store.best(*asked)[0]) == 1
+    store.remove(slot)
+    with pytest.raises(ValueError, match="slot"):
+        store.best(*asked)
+    with pytest.raises(ValueError, match="slot"):
+        store.remove(slot)
+    assert store.add(other) == slot + 1
 
 
 def makes() -> list[type]:
