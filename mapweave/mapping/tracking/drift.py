@@ -21,6 +21,8 @@ from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints
 
+CHANCE = 1.5  # sigma by which the numbers of points on surfaces differ, where that is no chance
+
 
 class DriftParameters(StageParameters):
     """When a direction is open."""
@@ -254,9 +256,8 @@ class Drift:
         moved = direction[:2] + direction[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         step = self._p.shift / math.sqrt((moved**2).sum(axis=1).mean()) * direction
         poses = np.array([pose, pose + step, pose - step])
-        on_surface = known.explained(seen, poses, self._p.reach, until)
-        here, there, back = on_surface.sum(axis=1).tolist()
-        return int(here - max(there, back))
+        here, *aside = known.explained(seen, poses, self._p.reach, until)
+        return min(_fewer(here, there) for there in aside)
 
     def _grow(self, direction: FloatArray, pace: Pace) -> None:
         """Add what is not known of a step along a `direction` (3,).
@@ -270,3 +271,15 @@ class Drift:
         squares = np.maximum(np.einsum("i,kij,j->k", metric, self._covariances, metric), 0.0)
         more = 2 * np.sqrt(squares) / (direction @ metric) * grown + grown**2
         self._covariances = self._covariances + more[:, None, None] * np.outer(direction, direction)
+
+
+def _fewer(here: BoolArray, there: BoolArray) -> int:
+    """Return by how many fewer points are on surfaces `there` (n,) than `here`; 0 by chance.
+
+    Of noisy points some always leave surfaces and others come to lie on them, wherever they are
+    moved to: of so many changes either way the root is a sigma of their difference (McNemar's
+    test). Where none come to lie on surfaces, a few that leave them are no chance.
+    """
+    lost, gained = np.count_nonzero(here & ~there), np.count_nonzero(there & ~here)
+    fewer = int(lost - gained)
+    return fewer if fewer >= CHANCE * math.sqrt(lost + gained) else 0

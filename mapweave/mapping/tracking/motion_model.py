@@ -138,10 +138,14 @@ class MotionModel:
         """Return what is not known of a step with `turn` [rad] that nothing holds: [m], [rad].
 
         It is more than steps differ by: a robot that stops is wrongly expected again and again.
+        Nor is one held still that jitters where hardly anything holds it: what is usual of late is
+        no less uncertain than what was usual with such a turn.
         """
-        p, usual = self._p, self._usual_way(turn)
-        way = p.max_sigma if usual is None else p.unsure * math.hypot(*usual)
-        return way, self._turn_sigma
+        p, alike = self._p, self._alike(turn, self._p.known)
+        if len(alike) < p.enough:
+            return p.max_sigma, self._turn_sigma
+        lengths = [math.hypot(x, y) for x, y in alike]
+        return p.unsure * max(median(lengths), median(lengths[: p.steps])), self._turn_sigma
 
     @property
     def is_paced(self) -> bool:
@@ -184,14 +188,17 @@ class MotionModel:
     def _usual_way(self, turn: float) -> tuple[float, float] | None:
         """Return the median way [m] that went with turns like `turn` [rad]; None of too few."""
         if turn not in self._usual:
-            alike, found = self._alike(turn), None
+            alike, found = self._alike(turn, self._p.steps), None
             if len(alike) >= self._p.enough:
                 found = median(x for x, _ in alike), median(y for _, y in alike)
             self._usual[turn] = found
         return self._usual[turn]
 
-    def _alike(self, turn: float) -> list[tuple[float, float]]:
-        """Ways that went with turns alike, the latest; to the other side counts as well."""
+    def _alike(self, turn: float, most: int) -> list[tuple[float, float]]:
+        """At `most` so many ways that went with turns alike, the latest first.
+
+        To the other side counts as well.
+        """
         p = self._p
         apart = max(p.alike, p.alike_share * abs(turn))
         low, high = turn - apart, turn + apart
@@ -203,7 +210,7 @@ class MotionModel:
                 found.append((x, -y))
             else:
                 continue
-            if len(found) == p.steps:
+            if len(found) == most:
                 break
         return found
 

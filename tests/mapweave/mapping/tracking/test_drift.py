@@ -37,6 +37,26 @@ class Endless:
         return np.abs(x) < self._end if ends else np.ones_like(x, dtype=np.bool_)
 
 
+class Noisy:
+    """A wall on which so many points no longer lie when moved aside, and so many others do."""
+
+    newest = 9
+
+    def __init__(self, lost: int, gained: int) -> None:
+        self._lost, self._gained = lost, gained
+
+    def explained(
+        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
+    ) -> BoolArray:
+        """See `Surroundings`."""
+        assert reach < 1.0
+        assert until <= self.newest
+        explained = np.ones((len(poses), len(points)), dtype=np.bool_)
+        explained[0, : self._gained] = False
+        explained[1:, self._gained : self._gained + self._lost] = False
+        return explained
+
+
 def told(robot_map: RobotMap) -> FloatArray:
     """Return (n, 4) how surely each scan was placed, in the order of the log."""
     return np.concatenate([np.asarray(s.trajectory.uncertainty) for s in robot_map.submaps])
@@ -67,6 +87,16 @@ def test_along_a_bare_wall_what_is_not_known_of_each_step_adds_up_without_end(sc
 def test_one_scan_or_two_that_nothing_holds_are_no_drift() -> None:
     assert not drifted(2, Endless(9, 99.0)).covariance.any()
     assert drifted(3, Endless(9, 99.0)).covariance.any()
+
+
+@pytest.mark.parametrize(("lost", "gained", "held"), [(8, 0, True), (16, 10, False)])
+def test_noisy_points_that_come_and_go_by_chance_hold_nothing(
+    lost: int, gained: int, *, held: bool
+) -> None:
+    drift = Drift(DriftParameters())
+    for _ in range(10):
+        drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Noisy(lost, gained), PACE)
+    assert drift.covariance.any() != held
 
 
 def test_it_is_over_when_what_was_mapped_before_holds_the_robot_again() -> None:

@@ -68,6 +68,14 @@ def test_steps_along_bare_walls_teach_nothing() -> None:
     np.testing.assert_allclose(motion_model.way(0.0)[:2], STRAIGHT[:2])
 
 
+def test_a_robot_that_seems_to_stand_since_a_moment_is_not_known_better() -> None:
+    """Where hardly anything holds it, standing still is as good a fit; on the spot it is one."""
+    motion_model = paced(*[STRAIGHT] * 30, *[ON_THE_SPOT] * 7, *[STRAIGHT * 0.05] * 7)
+    np.testing.assert_allclose(motion_model.way(0.0)[:2], STRAIGHT[:2] * 0.05)
+    assert motion_model.unknown(0.0)[0] == pytest.approx(0.25)
+    assert motion_model.unknown(0.35)[0] < 0.05
+
+
 @pytest.mark.parametrize("missed", [1, 3])
 def test_while_scans_are_missed_a_robot_goes_on_or_stops(missed: int) -> None:
     motion_model = paced(*[np.array([0.5, 0.0, 0.0])] * 12)
