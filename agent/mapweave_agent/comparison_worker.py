@@ -4,8 +4,6 @@ A thread would not do: hypothesis and verification are many small numpy operatio
 Python's lock most of the time.
 """
 
-import os
-import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -93,9 +91,6 @@ class ComparisonWorker(Worker):
 
 def _serve(pipe: Connection, align: Aligner) -> None:
     """Compare what comes through `pipe` until its other end is closed."""
-    if sys.platform == "linux":
-        # Nicest of all is not enough: of a team of twenty on one machine a dozen compare at once.
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     answer(pipe, NICENESS, lambda maps: _compare(align, *maps))
 
 

@@ -3,12 +3,10 @@
 import operator
 import os
 import signal
-import sys
 import time
 from functools import partial
 
 import numpy as np
-import pytest
 
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
@@ -46,18 +44,6 @@ def test_what_comes_back_is_what_the_function_returns() -> None:
     assert outcome.alignments is not None
     (alignment,) = outcome.alignments
     assert (alignment.decision, alignment.reason) == (expected.decision, expected.reason)
-
-
-def _policy(_: RobotMap, __: RobotMap) -> list[int]:
-    return [os.sched_getscheduler(0)]
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="others have no such class")
-def test_comparing_takes_what_processors_have_left() -> None:
-    """Twenty robots on one machine compare all the time, and versions wait for none of it."""
-    with ComparisonWorker(_policy) as comparer:  # type: ignore[arg-type]
-        comparer.start(COMPARISON)
-        assert outcome_of(comparer).alignments == (os.SCHED_IDLE,)
 
 
 def test_a_function_takes_its_parameters_along() -> None:
