@@ -1,7 +1,6 @@
 """Builds versions in a thread of its own, so that receiving goes on meanwhile."""
 
 import logging
-import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -76,7 +75,6 @@ class VersionBuilder:
         self._packer = JointPacker()
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="builder")
         self._future: Future[Built] | None = None
-        self._is_wanted = threading.Event()
 
     def __enter__(self) -> "VersionBuilder":
         return self
@@ -87,7 +85,6 @@ class VersionBuilder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._is_wanted.set()
         self._worker.shutdown(wait=True)
 
     @property
@@ -105,7 +102,6 @@ class VersionBuilder:
 
         If it is `patient` nothing waits for the next version, however long this one takes.
         """
-        self._is_wanted.set()
         self._future = self._worker.submit(self._build, draft, begun, patient)
         self._future.add_done_callback(lambda _: self._ready())
 
@@ -124,11 +120,6 @@ class VersionBuilder:
             return None
         return future.result()
 
-    def go_on(self) -> None:
-        """Compare the submaps that wait, until all are or the next version is started."""
-        self._is_wanted.clear()
-        self._worker.submit(self._compare_ahead)
-
     def in_series(self, built: Built) -> Built:
         """Return a version as one of the series that is set now."""
         message, payload = self._packed(built.joint)
@@ -137,10 +128,6 @@ class VersionBuilder:
     def _build(self, draft: Draft, begun: float, patient: bool) -> Built:
         joint = draft.build(self._builder, patient=patient)
         return Built(draft, begun, joint, *self._packed(joint), self._builder.has_more)
-
-    def _compare_ahead(self) -> None:
-        while not self._is_wanted.is_set() and self._builder.compare_ahead():
-            pass
 
     def _packed(self, joint: JointMap) -> tuple[JointMapMessage, bytes]:
         message = JointMapMessage.pack(joint, self.series, self._packer)

@@ -176,8 +176,6 @@ class Service:
             record(self._story.joined(built.joint))
         has_more = built is not None and built.has_more
         self._coordinator.finish(built.joint if built else None, has_more=has_more)
-        if has_more:
-            self._builder.go_on()
 
     def _keep(self, built: Built) -> Built:
         """Store a version; return it, as one of another series where there is no room."""

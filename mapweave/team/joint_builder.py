@@ -58,10 +58,6 @@ class JointMapBuilder:
         """Whether the last version left submaps uncompared: one more of the same would fit them."""
         return self._weaver.has_more
 
-    def compare_ahead(self) -> bool:
-        """Compare two submaps that wait for the next version; return whether any did."""
-        return self._weaver.compare_ahead()
-
     def build(
         self,
         maps: Sequence[RobotMap],

@@ -98,24 +98,13 @@ class JointOptimizer:
         self._p = parameters or JointOptimizationParameters()
         self._loops = LoopCloser(self._p.loops)
         self._known: dict[_Compared, Constraint | None] = {}  # what was asked for last comes last
-        # By their lines, about where the last version asked first for what it did not wait for.
-        self._waiting: dict[tuple[LineMap, LineMap], _Compared] = {}
         self.turn()
 
     def turn(self, *, patient: bool = False) -> None:
         """Begin another version; one that is `patient` waits for all its comparisons."""
         self._left: int | None = None if patient else self._p.at_once
         self._asked = 0
-        self._waiting.clear()
         self.has_more = False
-
-    def compare_ahead(self) -> bool:
-        """Make one comparison that waits for the next version; return whether there was one."""
-        if not self._waiting:
-            return False
-        asked = self._waiting.pop(next(iter(self._waiting)))
-        self._known[asked] = self._compared(asked)
-        return True
 
     def weave(
         self,
@@ -213,7 +202,6 @@ class JointOptimizer:
             link = self._known.pop(asked)
         elif self._left == 0:
             self.has_more = True
-            self._waiting.setdefault((asked.older, asked.newer), asked)
             return None
         else:
             self._left = None if self._left is None else self._left - 1

@@ -53,21 +53,3 @@ def test_a_version_says_whether_submaps_wait_for_the_next_one(
             built = builder.take()
             assert built is not None
             assert built.has_more is waits
-
-
-def test_submaps_that_wait_are_compared_until_the_next_version_is_started(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    compared = threading.Event()
-
-    def compare_ahead(_: JointMapBuilder) -> bool:
-        compared.set()
-        return True
-
-    monkeypatch.setattr(JointMapBuilder, "compare_ahead", compare_ahead)
-    with VersionBuilder("series", Config()) as builder:
-        builder.go_on()
-        assert compared.wait(60.0)
-        builder.start(Draft(1, (), ()), time.time())
-        assert builder.take() is not None
-        builder.go_on()

@@ -25,6 +25,7 @@ WITH_ONE_DOOR = [
 ]
 SEEDS = range(1, 4)
 ROUNDS = 4  # of driving where the search goes on
+AT_A_WINDOW = 1.5  # [m]: what lies before it is seen only by beams that go to other walls
 
 
 def searched(seed: int, *left_out: Room) -> list[FloatArray]:
@@ -95,7 +96,7 @@ def searched_by_driving(world: World, stops: FloatArray, *left_out: Room) -> lis
     stops = nearest_first(stops)
     not_there = shapely.union_all([room.inside.buffer(0.5) for room in left_out])
     for _ in range(ROUNDS):
-        found = [f for f in left(world, stops) if shapely.distance(line(f), GLASS) > 0.5]
+        found = [f for f in left(world, stops) if shapely.distance(line(f), GLASS) > AT_A_WINDOW]
         to_see = [f.mean(axis=0) for f in found if not shapely.intersects(not_there, line(f))]
         if not to_see:
             break

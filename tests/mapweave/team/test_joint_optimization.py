@@ -187,26 +187,6 @@ def test_what_is_not_compared_at_once_is_compared_the_next_time(frames: FloatArr
         np.testing.assert_array_equal(poses[name], own)
 
 
-def test_what_is_compared_between_two_versions_the_next_one_need_not_compare(
-    frames: FloatArray,
-) -> None:
-    """And in the end all lies where it would have lain at once."""
-    cluster, robots, alignments = team(BENT, frames)
-    weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1))
-    versions = 0
-    while not versions or weaver.has_more:
-        weaver.turn()
-        woven, _ = weaver.weave(cluster, robots, alignments)
-        versions += 1
-        ahead = 0
-        while weaver.compare_ahead():
-            ahead += 1
-        assert (ahead > 0) == weaver.has_more
-    whole, _ = WHOLE.weave(cluster, robots, alignments)
-    np.testing.assert_array_equal(woven.poses["b/0"], whole.poses["b/0"])
-    assert versions <= 1 + JointOptimizationParameters().rounds
-
-
 def test_a_patient_version_leaves_nothing_to_the_next_one(frames: FloatArray) -> None:
     weaver = JointOptimizer(JointOptimizationParameters(newest=True, at_once=1))
     weaver.turn(patient=True)
