@@ -68,6 +68,7 @@ class Tree:
         """
         folders = os.pathsep.join([str(self.site), sysconfig.get_path("purelib")])
         environment = {**os.environ, "PYTHONPATH": folders, "PYTHONSAFEPATH": "1"}
+        environment.pop("OPENBLAS_NUM_THREADS", None)  # each commit says it itself
         # -S: what is installed as editable would come before everything else.
         command = [sys.executable, "-S", "-m", "mapweave", *map(str, words)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -13,6 +13,15 @@ if _HEARD:  # not where a shell started it in the background
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def _multiply_alone() -> None:
+    """Let matrix products take one thread, unless the environment says how many.
+
+    Ours are small: OpenBLAS shares one between all cores in no less time, and its threads then
+    wait for the next one at full speed, for tens of milliseconds each.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read once, as numpy is loaded
+
+
 def _ready_streams() -> None:
     """Fill what was closed, and let no output fail for a letter that a terminal does not have.
 
@@ -30,6 +39,7 @@ def _ready_streams() -> None:
 def main() -> int:
     """Run the program and return its exit status."""
     _ready_streams()
+    _multiply_alone()
     from mapweave import cli
 
     if _HEARD:

@@ -63,6 +63,25 @@ def test_help_imports_no_command_and_nothing_that_is_slow_to_load() -> None:
     assert loaded.isdisjoint(point.module for point in entry_points(group=cli.COMMAND_GROUP))
 
 
+@pytest.mark.parametrize(("told", "taken"), [(None, "1"), ("3", "3")])
+def test_matrix_products_take_one_thread_unless_the_environment_says_how_many(
+    told: str | None, taken: str
+) -> None:
+    code = (
+        "import os, sys\n"
+        "from mapweave import __main__, cli\n"
+        "cli.main = lambda: print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])\n"
+        "__main__.main()\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    if told is not None:
+        environment["OPENBLAS_NUM_THREADS"] = told
+    said = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert said.stdout.split() == ["False", taken]  # too late once numpy is loaded
+
+
 @pytest.mark.parametrize("command", ["Command('Try' + ' it.', None, run)", "make()"])
 def test_a_summary_that_the_source_does_not_state_is_looked_up(
     command: str,
