@@ -47,9 +47,9 @@ class CoordinatorParameters(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    min_interval: float = Field(default=0.5, ge=0, allow_inf_nan=False)
+    min_interval: float = Field(default=1.0, ge=0, allow_inf_nan=False)
     """Least time between two versions [s] unless an alignment is joined or revoked: a person
-    watching sees the map grow. Of a large team building takes as long; the next one waits."""
+    watching sees the map grow. Of a large team building takes longer; the next one waits."""
 
     max_robots: int = Field(default=64, ge=1)
     """Robots listened to; the largest teams of the DARPA Subterranean Challenge had a dozen."""
