@@ -30,6 +30,7 @@ class ReasonKind(StrEnum):
     PARTS_AGREE = "parts_agree"  # these say more about what was found
     BENT = "bent"  # the place is right, the maps as wholes may not be
     MET_BEFORE = "met_before"
+    FOLLOWED = "followed"  # of a stored map that one of the robots only follows in
     MIRRORED = "mirrored"  # they would fit if one were mirrored
 
     REBASED = "rebased"  # what was compared is in another component by now
@@ -72,6 +73,7 @@ _ABOUT_FOUND = {
     ReasonKind.PARTS_AGREE,
     ReasonKind.BENT,
     ReasonKind.MET_BEFORE,
+    ReasonKind.FOLLOWED,
     ReasonKind.MIRRORED,
     ReasonKind.OTHERS_CONTRADICT,
     ReasonKind.MAPS_CONTRADICT,

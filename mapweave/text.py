@@ -37,6 +37,7 @@ _SENTENCES = {
     ReasonKind.BENT: "{found}; but from there the maps go on for {reach:.0f} m, where they may be"
     " bent by more than {tolerance:g} m: right as a whole with {sure} only",
     ReasonKind.MET_BEFORE: "the robots met before; {found}",
+    ReasonKind.FOLLOWED: "by the stored map that one of them follows in; {found}",
     ReasonKind.MIRRORED: "{found}; mirrored, the two have {match}: one of the sensors seems to hang"
     " upside down, or to turn the other way round, and nothing says so",
     ReasonKind.REBASED: "what was compared is in another component by now; to be compared again",

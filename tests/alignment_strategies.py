@@ -31,6 +31,7 @@ ABOUT_FOUND: dict[ReasonKind, list[str]] = {
     ReasonKind.PARTS_AGREE: ["parts", "spread"],
     ReasonKind.BENT: ["reach", "tolerance", "confidence"],
     ReasonKind.MET_BEFORE: [],
+    ReasonKind.FOLLOWED: [],
     ReasonKind.MIRRORED: MATCH,
     ReasonKind.OTHERS_CONTRADICT: ["distance", "turn"],
     ReasonKind.MAPS_CONTRADICT: MATCH,

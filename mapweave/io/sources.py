@@ -26,6 +26,7 @@ from mapweave.io.readers.ros_bags.frames import StaticFrames
 from mapweave.io.readers.scan_lines import read_scan_lines
 from mapweave.io.readers.scans import count_scans, read_scans
 from mapweave.io.readers.streams import BLOCK
+from mapweave.io.refusals import Refusals
 from mapweave.scan.scan import Scan
 
 SOURCE_GROUP = "mapweave.sources"
@@ -129,9 +130,10 @@ class StandardInput:
         """Nobody knows."""
 
     def scans(self) -> Iterator[Scan]:
-        """As `read_scan_lines`."""
-        lines = split_lines(_blocks(sys.stdin.fileno()))
-        return read_scan_lines("standard input", lines, self.options)
+        """As `read_scan_lines`; what is left out is told at once, and not when all is over."""
+        name, lines = "standard input", split_lines(_blocks(sys.stdin.fileno()))
+        refusals = Refusals(name, self.options.on_warning, "line")
+        return read_scan_lines(name, lines, self.options, refusals.add)
 
     def close(self) -> None:
         """Nothing: nobody can wake who waits for a writer."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from mapweave.errors import ArgumentError
 from mapweave.geometry.arguments import as_number, as_numbers
 from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.scan.units import check_metres
 
 UNNUMBERED = -1
 """The index of a scan that belongs to no log: who maps it counts."""
@@ -128,7 +129,8 @@ class Scan:
         ------
         ArgumentError
             If one of them is no number, the angles are not finite, the increment is zero, nothing
-            is between the ranges, or the beams go round more than once.
+            is between the ranges, the beams go round more than once, or the distances seem to be
+            in millimetres.
 
         Examples
         --------
@@ -140,6 +142,7 @@ class Scan:
             raise ArgumentError("angle_increment", "expected an angle [rad] other than 0")
         low, high = _span(range_min, range_max)
         given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
+        check_metres(given, high)
         used = np.where((given >= low) & (given <= high), given, np.nan)
         angles = first + step * np.arange(given.size, dtype=np.float64)
         each = as_number("time_increment", time_increment, "expected a time [s]")

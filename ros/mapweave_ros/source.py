@@ -10,13 +10,13 @@ import zenoh
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags.frames import TF_STATIC
 from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN, UnreadableMessageError
+from mapweave.io.refusals import Refusals
 from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
 from mapweave_protocol.link.inbox import Arrival, Inbox
 from mapweave_ros.address import Laser, Ros2Address
 from mapweave_ros.graph import topics_of_type
 from mapweave_ros.output import open_when_there
-from mapweave_ros.refusals import Refusals
 from mapweave_ros.robot.beside_scans import BesideScans, kind_of_odometry
 from mapweave_ros.robot.frames import RobotFrames
 from mapweave_ros.robot.several_lasers import SeveralLasers

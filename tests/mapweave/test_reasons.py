@@ -60,6 +60,10 @@ ELSE = "12 m of wall in common, 3.0 m contradicted"
          f"{TOLD}; but from there the maps go on for 40 m, where they may be bent by more than"
          " 0.5 m: right as a whole with 40% only"),
         (Reason(ReasonKind.MET_BEFORE, found=FOUND), f"the robots met before; {TOLD}"),
+        (
+            Reason(ReasonKind.FOLLOWED, found=FOUND),
+            f"by the stored map that one of them follows in; {TOLD}",
+        ),
         (Reason(ReasonKind.PINNED, text="anna: same door"), "pinned by anna: same door"),
         (Reason(ReasonKind.PINNED, found=FOUND, text="anna: same door"),
          f"pinned by anna: same door; {TOLD}"),

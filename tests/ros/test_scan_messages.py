@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapweave.io.readers.ros_bags.laser_messages import UnreadableMessageError
-from mapweave_ros.refusals import Refusals
+from mapweave.io.refusals import Refusals
 from mapweave_ros.scan_messages import MAX_BYTES, ScanMessages
 from tests.ros.lasers import TYPE, laser_scan
 

@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeAlias
 
 from mapweave.geometry import se2
 from mapweave.maps import Alignment, RobotMap, SharedPlace, Submap, component_name
+from mapweave.reasons import Reason, ReasonKind
 from mapweave_agent.comparison_schedule import Comparison
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 from mapweave_protocol.wire.pairs import Run, run_of
@@ -95,6 +96,7 @@ class TeamPlace:
 
     def _on_path(self, found: Alignment, name: str, submap: Submap) -> Alignment:
         """Return what was `found` of a wall of the stored map, held by a stretch of the path."""
+        found = replace(found, cause=Reason(ReasonKind.FOLLOWED, found=found.cause))
         poses = {s.id: s.pose for s in self._known.submaps}
         for place in found.places[:1]:
             own = place.reference if name == found.reference else place.other

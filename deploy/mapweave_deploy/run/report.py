@@ -147,7 +147,7 @@ def _tell_traffic(outcome: TeamOutcome, members: Sequence[Member]) -> Iterator[s
         metres = 0.0 if robot_map is None else path_length(robot_map)
         total = sum(count.size for count in counts.values())
         kinds = ", ".join(
-            f"{kind} {_rate(count.size, metres)} in {count.messages} messages"
+            f"{kind} {_rate(count.size, metres)} in {counted(count.messages, 'message')}"
             for kind, count in counts.items()
         )
         yield f"  {member.robot}: {_size(total)}, {_rate(total, metres)} a metre: {kinds}"

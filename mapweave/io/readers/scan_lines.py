@@ -8,7 +8,7 @@ that did not come back is ``null``, or as in `Scan.of`. A line may name the form
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +38,14 @@ def read(path: Path, options: ReadOptions) -> Iterator[Scan]:
 
 
 def read_scan_lines(
-    name: Path | str, lines: Iterable[Line], options: ReadOptions
+    name: Path | str,
+    lines: Iterable[Line],
+    options: ReadOptions,
+    on_damaged: Callable[[str], None] = lambda _: None,
 ) -> Iterator[Scan]:
     """Yield the scans of `lines`; `name` says where they are from, in warnings and errors.
+
+    `on_damaged` is told of each line that is left out, and why, when it is.
 
     Raises
     ------
@@ -58,6 +63,7 @@ def read_scan_lines(
                 scan = _scan(tally.scans, content, odometry=options.odometry)
             except (UnreadableLineError, ArgumentError) as error:
                 tally.add_damaged(line.number, error)
+                on_damaged(f"line {line.number}: {error}")
                 continue
             tally.add_scan(scan)
             yield scan

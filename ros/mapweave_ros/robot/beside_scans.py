@@ -20,10 +20,10 @@ from mapweave.io.readers.ros_bags.laser_messages import (
     TF_MESSAGE,
     UnreadableMessageError,
 )
+from mapweave.io.refusals import Refusals
 from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
 from mapweave_protocol.link.inbox import Arrival
-from mapweave_ros.refusals import Refusals
 from mapweave_ros.robot.frames import RobotFrames
 from mapweave_ros.scan_messages import ScanMessages
 from mapweave_ros.topics import TopicKeys, dds_type_of

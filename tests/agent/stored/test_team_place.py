@@ -81,6 +81,12 @@ def test_a_component_is_joined_with_one_run_and_stays_with_it_while_that_holds()
     assert accepted(told) == {"a": [], "c": ["accepted"]}
 
 
+def test_it_is_told_that_the_walls_in_common_are_those_of_the_stored_map() -> None:
+    [message] = compared(TeamPlace(KNOWN), found("a", 0.9))
+    [alignment] = message.unpack()
+    assert alignment.reason == "by the stored map that one of them follows in; so"
+
+
 def test_refusals_of_walls_that_are_not_its_own_are_not_told() -> None:
     assert compared(TeamPlace(KNOWN), found("a", 0.1, "refused")) == []
 

@@ -1,5 +1,6 @@
 """A source is a file, standard input, or what a package brings under a scheme of its own."""
 
+import os
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -79,3 +80,19 @@ def test_a_dash_is_standard_input() -> None:
     assert isinstance(source, StandardInput)
     assert source.live
     assert source.count() is None  # type: ignore[func-returns-value]  # as it says
+
+
+def test_what_a_driver_writes_wrongly_is_told_while_it_writes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+    reading, writing = os.pipe()
+    scan = b'{"ranges": [1.0, 2.0], "angle_min": 0.0, "angle_increment": 0.1}\n'
+    with os.fdopen(reading) as driver:
+        monkeypatch.setattr("sys.stdin", driver)
+        os.write(writing, b"no scan\n" + scan)
+        scans = open_source("-", ReadOptions(on_warning=told.append)).scans()
+        assert next(scans).ranges.tolist() == [1.0, 2.0]
+        assert told == ["standard input: line refused: line 1: is no JSON"]
+        os.close(writing)
+        assert list(scans) == []

@@ -181,3 +181,26 @@ def test_what_drivers_state_are_numbers(name: str, value: float) -> None:
     stated: dict[str, Any] = {"angle_min": 0.0, "angle_increment": 0.1, name: value}
     with pytest.raises(ArgumentError, match=rf"^{name}: expected"):
         Scan.of([1, 2], **stated)
+
+
+ROOM = np.linspace(0.4, 6.0, 360)  # [m]
+
+
+@pytest.mark.parametrize("range_max", [12.0, 12_000.0, math.inf])
+def test_distances_in_millimetres_are_refused_in_words(range_max: float) -> None:
+    with pytest.raises(ArgumentError, match=r"ranges: .* in millimetres\?"):
+        Scan.of(ROOM * 1000, -math.pi, math.radians(1.0), range_max=range_max)
+
+
+@pytest.mark.parametrize("nothing", [0.0, 13.0, 65.535, 8191.0, 1e9, math.inf])
+def test_what_did_not_come_back_is_no_distance_in_another_unit(nothing: float) -> None:
+    ranges = np.full(360, nothing)
+    ranges[:20] = ROOM[:20]
+    scan = Scan.of(ranges, -math.pi, math.radians(1.0), range_max=12.0)
+    assert scan.hits.sum() == 20
+
+
+def test_a_few_far_returns_in_the_open_are_distances_in_metres() -> None:
+    ranges = np.full(360, math.nan)
+    ranges[:100] = np.linspace(105.0, 180.0, 100)
+    assert Scan.of(ranges, -math.pi, math.radians(1.0)).hits.sum() == 100

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -105,14 +106,13 @@ def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
     maximum = laser.range_max
     with np.errstate(invalid="ignore"):  # NaN of the kind that signals
         measured = laser.ranges.astype(np.float64)
-    if maximum > 0:  # False for NaN; one that is no distance states nothing
-        measured = np.where(measured < maximum, measured, np.nan)
     stamp = laser.header.stamp
     return Scan.of(
         measured,
         laser.angle_min,
         laser.angle_increment,
         range_min=laser.range_min if laser.range_min > 0 else 0.0,  # also where it is NaN
+        range_max=math.nextafter(maximum, 0) if maximum > 0 else math.inf,  # likewise
         index=index,
         stamp=stamp.sec + stamp.nanosec * 1e-9,
         time_increment=laser.time_increment if laser.time_increment > 0 else 0.0,
