@@ -21,6 +21,7 @@ from mapweave.parameters import StageParameters, derived
 from mapweave.scan.free_space import from_rings
 
 Lines: TypeAlias = NDArray[np.object_]  # of shapely
+MOST_STOPS = 2000  # along one frontier, however far a map that came in says it goes
 STOPS = 8  # of a disc that rolls along an edge, on its diameter's length
 
 
@@ -121,7 +122,8 @@ def _fits_beyond(
 
     It rolls along the part, on the side that is not `free`, and must meet no obstacle.
     """
-    stops = shapely.segmentize(parts, p.min_width / STOPS)
+    step = np.maximum(p.min_width / STOPS, shapely.length(parts) / MOST_STOPS)
+    stops = shapely.segmentize(parts, step)
     corners, owner = shapely.get_coordinates(stops, return_index=True)
     step, touched = np.diff(corners, axis=0), (corners[1:] + corners[:-1]) / 2
     length = np.hypot(*step.T)

@@ -117,6 +117,12 @@ def test_without_walls_all_of_the_outline_is_a_frontier() -> None:
     assert sum(length(line) for line in coverage(line_map([], square)).frontiers) == 8.0
 
 
+def test_an_outline_that_is_said_to_go_round_the_earth_takes_no_more_memory() -> None:
+    far = 1e7  # [m]
+    square = [[0.0, 0.0], [far, 0.0], [far, far], [0.0, far]]
+    assert sum(length(line) for line in coverage(line_map([], square)).frontiers) == 4 * far
+
+
 def test_frontiers_are_what_is_left_beyond_the_reach_of_all_walls() -> None:
     """As areas tell: walls made as wide as they reach, cut out of the outline."""
     random = np.random.default_rng(0)
