@@ -118,12 +118,12 @@ def _widths(parts: Lines, reach: float) -> FloatArray:
 def _fits_beyond(
     parts: Lines, free: BaseGeometry, obstacles: shapely.STRtree, p: CoverageParameters
 ) -> BoolArray:
-    """Return for each of (k,) `parts` of outlines whether a disc as wide as a way fits beyond it.
+    """Return (k,) for each of `parts` of outlines whether a disc as wide as a way fits beyond it.
 
     It rolls along the part, on the side that is not `free`, and must meet no obstacle.
     """
-    step = np.maximum(p.min_width / STOPS, shapely.length(parts) / MOST_STOPS)
-    stops = shapely.segmentize(parts, step)
+    apart = np.maximum(p.min_width / STOPS, shapely.length(parts) / MOST_STOPS)
+    stops = shapely.segmentize(parts, apart)
     corners, owner = shapely.get_coordinates(stops, return_index=True)
     step, touched = np.diff(corners, axis=0), (corners[1:] + corners[:-1]) / 2
     length = np.hypot(*step.T)

@@ -142,7 +142,7 @@ class Scan:
             raise ArgumentError("angle_increment", "expected an angle [rad] other than 0")
         low, high = _span(range_min, range_max)
         given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
-        check_metres(given, high)
+        check_metres(given)
         used = np.where((given >= low) & (given <= high), given, np.nan)
         angles = first + step * np.arange(given.size, dtype=np.float64)
         each = as_number("time_increment", time_increment, "expected a time [s]")

@@ -21,8 +21,6 @@ from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints
 
-CHANCE = 1.5  # sigma by which the numbers of points on surfaces differ, where that is no chance
-
 
 class DriftParameters(StageParameters):
     """When a direction is open."""
@@ -43,6 +41,12 @@ class DriftParameters(StageParameters):
         description="points that are then on no surface, each way, by which a direction is held;"
         " in round rooms, bare corridors and along one wall there are 4 at the most in 19 of 20"
         " scans, in recordings of offices 8 and more in as many",
+    )
+    chance: float = Field(
+        1.5,
+        ge=0,
+        description="sigma by which more points leave surfaces than come to lie on others, where"
+        " that is no chance",
     )
     returned: float = Field(
         0.1,
@@ -251,13 +255,16 @@ class Drift:
         known: Surroundings,
         until: int,
     ) -> int:
-        """Return how many points lie on nothing known when moved along a `direction` (3,)."""
+        """Return how many fewer points are on what is known when moved along a `direction` (3,).
+
+        None where that may be chance.
+        """
         arms = seen.points @ se2.rotation(pose[2]).T
         moved = direction[:2] + direction[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         step = self._p.shift / math.sqrt((moved**2).sum(axis=1).mean()) * direction
         poses = np.array([pose, pose + step, pose - step])
         here, *aside = known.explained(seen, poses, self._p.reach, until)
-        return min(_fewer(here, there) for there in aside)
+        return min(_fewer(here, there, self._p.chance) for there in aside)
 
     def _grow(self, direction: FloatArray, pace: Pace) -> None:
         """Add what is not known of a step along a `direction` (3,).
@@ -273,7 +280,7 @@ class Drift:
         self._covariances = self._covariances + more[:, None, None] * np.outer(direction, direction)
 
 
-def _fewer(here: BoolArray, there: BoolArray) -> int:
+def _fewer(here: BoolArray, there: BoolArray, sigmas: float) -> int:
     """Return by how many fewer points are on surfaces `there` (n,) than `here`; 0 by chance.
 
     Of noisy points some always leave surfaces and others come to lie on them, wherever they are
@@ -282,4 +289,4 @@ def _fewer(here: BoolArray, there: BoolArray) -> int:
     """
     lost, gained = np.count_nonzero(here & ~there), np.count_nonzero(there & ~here)
     fewer = int(lost - gained)
-    return fewer if fewer >= CHANCE * math.sqrt(lost + gained) else 0
+    return fewer if fewer >= sigmas * math.sqrt(lost + gained) else 0

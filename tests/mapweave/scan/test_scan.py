@@ -200,6 +200,11 @@ def test_what_did_not_come_back_is_no_distance_in_another_unit(nothing: float) -
     assert scan.hits.sum() == 20
 
 
+def test_a_maximum_that_is_set_low_cuts_off_distances_and_says_nothing_of_their_unit() -> None:
+    scan = Scan.of(ROOM + 20.0, -math.pi, math.radians(1.0), range_max=3.0)
+    assert not scan.hits.any()
+
+
 def test_a_few_far_returns_in_the_open_are_distances_in_metres() -> None:
     ranges = np.full(360, math.nan)
     ranges[:100] = np.linspace(105.0, 180.0, 100)
