@@ -18,7 +18,7 @@ from mapweave.mapping.component_merging import ComponentMerger, ComponentMerging
 from mapweave.mapping.drifted_paths import SURE, carried, found_again, is_near
 from mapweave.mapping.kidnap_detection import KidnapDetectionParameters, KidnapDetector, Kidnapping
 from mapweave.mapping.localization.fragments import FragmentFinder, FragmentParameters
-from mapweave.mapping.loop_closing import LoopCloser, LoopParameters
+from mapweave.mapping.loops.loop_closing import LoopCloser, LoopParameters
 from mapweave.mapping.submap_builder import SubmapBuilder, SubmapParameters
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.pose_covariance import EXACT

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.loop_closing import SubmapMatch
+from mapweave.mapping.loops.loop_closing import SubmapMatch
 from mapweave.maps import Submap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import Verdict

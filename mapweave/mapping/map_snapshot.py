@@ -23,7 +23,7 @@ def draw_here(builder: bytes) -> LineMap:
 
 
 class Unsettled:
-    """What built the last finished submap while that is being settled; it takes no more scans."""
+    """What built a finished submap while that waits to be settled; it takes no more scans."""
 
     def __init__(self, builder: SubmapBuilder) -> None:
         self._builder = builder
@@ -38,12 +38,15 @@ class Unsettled:
 
 
 def with_walls(
-    submaps: Sequence[Submap], unsettled: Unsettled | None, draw: Draw | None = None
+    submaps: Sequence[Submap], unsettled: Sequence[Unsettled], draw: Draw | None = None
 ) -> list[Submap]:
-    """Return `submaps`, of the one that is being settled the walls, and not its outline."""
-    if unsettled is None:
-        return list(submaps)
-    return [*submaps[:-1], replace(submaps[-1], map=unsettled.walls(draw))]
+    """Return `submaps`, of the last, which are not settled, the walls and not their outlines."""
+    settled = len(submaps) - len(unsettled)
+    drawn = [
+        replace(submap, map=each.walls(draw))
+        for submap, each in zip(submaps[settled:], unsettled, strict=True)
+    ]
+    return [*submaps[:settled], *drawn]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +60,7 @@ class MapSnapshot:
     finished
         Submaps.
     unsettled
-        What built the last of these, while it is being settled.
+        What built the last of these, as long as they are not settled.
     growing
         The submap that grows, without its lines.
     builder
@@ -73,7 +76,7 @@ class MapSnapshot:
     version: int
     made_with: MadeWith | None
     finished: tuple[Submap, ...]
-    unsettled: Unsettled | None
+    unsettled: tuple[Unsettled, ...]
     growing: Submap | None
     builder: bytes
     marks: tuple[Mark, ...] = ()

@@ -17,8 +17,9 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
 from mapweave.mapping.backend import Backend, BackendParameters, BackendRunner, FinishedSubmap
 from mapweave.mapping.continuation import first_component, marks_to_continue, scans_in, to_continue
-from mapweave.mapping.map_snapshot import Draw, MapSnapshot, Unsettled, draw_here, with_walls
+from mapweave.mapping.map_snapshot import Draw, MapSnapshot, draw_here, with_walls
 from mapweave.mapping.placement import Placement
+from mapweave.mapping.settling import SettlingQueue
 from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.deskewing import Deskewer
@@ -81,8 +82,8 @@ class Mapper:
     config
         What the map says that it was made with, unless other parameters are given.
     live
-        Whether no scan may wait for the backend: a submap grows on while the one before it is
-        being settled. The map then depends on how fast that is.
+        Whether no scan may wait for the backend: where that is late, finished submaps queue for
+        it, and its outcome is adopted later.
     on_warning
         Told in words what is odd about the scans, once: that the robot sees itself.
     known
@@ -132,10 +133,9 @@ class Mapper:
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
-        self._backend = backend or Backend(self.parameters.backend, self._finished)
-        self._live = live
+        backend = backend or Backend(self.parameters.backend, self._finished)
+        self._unsettled = SettlingQueue(backend, live=live)
         self._draw = draw
-        self._unsettled: Unsettled | None = None  # the last finished submap, while it is settled
         self._follows = False  # whether the growing submap was tracked from the last finished one
         self._merged: dict[int, Observation] = {}  # by scan index, those of the growing submap
         self._held: FloatArray = EXACT  # how surely the last scan is placed, tracker's frame
@@ -192,13 +192,14 @@ class Mapper:
         self._merge_all(self._tracker.settle())
         if not self._growing.is_empty:
             self._finish_submap()
-        self._adopt_settled()
+        while self._unsettled:
+            self._adopt_settled(wait=True)
         return self.robot_map()
 
     def robot_map(self) -> RobotMap:
         """Return the finished submaps and the growing one."""
         growing = [] if self._growing.is_empty else [self._submap(self._growing.line_map())]
-        submaps = (*with_walls(self._finished, self._unsettled), *growing)
+        submaps = (*with_walls(self._finished, self._unsettled.walls), *growing)
         made_with, marks = self._made_with, self._marks
         return RobotMap(self.robot, self.boot, self._version, submaps, made_with, marks)
 
@@ -211,7 +212,7 @@ class Mapper:
             self._version,
             self._made_with,
             tuple(self._finished),
-            self._unsettled,
+            self._unsettled.walls,
             None if empty else self._submap(LineMap.empty()),
             b"" if empty else MapSnapshot.packed(self._growing),
             self._marks,
@@ -353,7 +354,7 @@ class Mapper:
         if not self._growing.is_empty:
             self._finish_submap()
         if any(s.component == self._component for s in self._finished):
-            self._component = self._newest_component = self._spare() + (self._unsettled is not None)
+            self._component = self._newest_component = self._spare()
         self._follows = False
         self._tracker = self._tracker.afresh()
         self._loss = Loss(self.parameters.patience)
@@ -362,7 +363,9 @@ class Mapper:
 
     def _merge(self, seen: Observation, tracked: ScanMatch) -> None:
         """Merge a scan where it was found, tracker's frame, into the growing submap."""
-        if self._growing.is_full and (self._unsettled is None or self._may_settle()):
+        if len(self._unsettled) > 1:
+            self._adopt_settled()
+        if self._growing.is_full and self._unsettled.has_room:
             self._finish_submap()
         if self._growing.is_empty:
             self._frame = tracked.pose
@@ -376,52 +379,43 @@ class Mapper:
         self._version += 1
 
     def _finish_submap(self) -> None:
-        """Have the growing submap settled, adopt what became of the one before, start another."""
+        """Adopt what became of the submap before, have the growing one settled, start another."""
         self._adopt_settled()
         submap = self._submap(self._growing.outline())
         scans = tuple(self._merged[k] for k in submap.trajectory.scan_index.tolist())
-        self._backend.begin(
+        self._finished.append(submap)
+        self._unsettled.append(
             FinishedSubmap(submap, scans, self._growing, self._follows, self._spare())
         )
-        self._finished.append(submap)
-        self._unsettled, self._follows = Unsettled(self._growing), True
+        self._follows = True
         self._tracker.drift.mark()
         self._growing = SubmapBuilder(self.parameters.backend.submap)
         self._merged = {}
         self._version += 1
 
-    def _adopt_settled(self) -> None:
-        """Move everything to where it settled, the growing submap with the last scan before it."""
-        if self._unsettled is None:
+    def _adopt_settled(self, *, wait: bool = False) -> None:
+        """Move all to where the first unsettled submap settled, if that is known; live, or `wait`.
+
+        The growing one moves with the last scan of the submap that it was tracked from.
+        """
+        adopted = self._unsettled.adopt(self._finished, wait=wait)
+        if adopted is None:
             return
-        settled = self._backend.take()
-        if settled is None:
-            self._finished = with_walls(self._finished, self._unsettled)
-        self._unsettled = None
-        if settled is None:
-            return
-        before = _end(self._finished[-1])
-        self._finished = settled.applied(self._finished)
+        self._finished = adopted.submaps
+        self._newest_component = max(self._newest_component, adopted.newest_component)
         self._version += 1
-        self._newest_component = max(self._newest_component, settled.newest_component)
-        if self._follows:
-            if settled.is_held:
-                self._tracker.drift.end()
-            after = _end(self._finished[-1])
+        if self._follows and adopted.moved is not None:
             self._component = self._finished[-1].component
-            moved = se2.compose(after, se2.inverse(before))
-            self._origin = se2.compose(moved, self._origin)
+            self._origin = se2.compose(adopted.moved, self._origin)
+            if adopted.is_held:
+                self._tracker.drift.end()
 
     def _spare(self) -> int:
         """Return the next component's number. One that joined another is not given again.
 
-        While a submap is being settled, this number is lent: it may be found to need one.
+        Each submap that is not settled is lent one: it may be found to need it.
         """
-        return self._newest_component + 1
-
-    def _may_settle(self) -> bool:
-        """Whether the next submap can be handed over now: `live`, no scan waits for the last."""
-        return not self._live or self._backend.is_ready
+        return self._newest_component + 1 + len(self._unsettled)
 
     def _submap(self, lines: LineMap) -> Submap:
         """Return the growing submap with its `lines`."""
@@ -432,8 +426,3 @@ class Mapper:
             lines,
             self._growing.trajectory(),
         )
-
-
-def _end(submap: Submap) -> FloatArray:
-    """(3,) the pose of a submap's last scan, component frame."""
-    return se2.compose(submap.pose, submap.trajectory.pose[-1])

@@ -15,7 +15,7 @@ from pydantic import Field
 from mapweave.fusion.extrapolation import ExtrapolationParameters, bend
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.pose_graph import Constraint, optimise
+from mapweave.mapping.loops.pose_graph import Constraint, optimise
 from mapweave.maps import Alignment
 from mapweave.matching.distance_field import DistanceField
 from mapweave.parameters import StageParameters, derived

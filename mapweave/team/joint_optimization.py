@@ -16,9 +16,9 @@ from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.loop_closing import LoopCloser, LoopParameters, middle_of_path
-from mapweave.mapping.pose_graph import Constraint, optimise
-from mapweave.mapping.submap_graph import joining_covariance, tracking_covariance
+from mapweave.mapping.loops.loop_closing import LoopCloser, LoopParameters, middle_of_path
+from mapweave.mapping.loops.pose_graph import Constraint, optimise
+from mapweave.mapping.loops.submap_graph import joining_covariance, tracking_covariance
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.alignment_graph import Cluster

@@ -43,7 +43,7 @@ def test_what_is_being_settled_is_drawn_once() -> None:
     for scan in scans_along(BUILDING, [(3, 1), (28, 1)], 1)[0]:
         mapper.add(scan)
     snapshot = mapper.snapshot()
-    assert snapshot.unsettled is not None
+    assert snapshot.unsettled
 
     def draw(builder: bytes) -> LineMap:
         drawn.append(builder)

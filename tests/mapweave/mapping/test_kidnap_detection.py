@@ -17,7 +17,7 @@ from mapweave.mapping.kidnap_detection import (
     departs,
     refuted,
 )
-from mapweave.mapping.loop_closing import SubmapMatch
+from mapweave.mapping.loops.loop_closing import SubmapMatch
 from mapweave.mapping.mapper import Mapper
 from mapweave.mapping.tracking.observation import ObservationParameters, observe
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory

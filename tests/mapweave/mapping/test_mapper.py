@@ -353,28 +353,6 @@ def test_the_number_of_a_component_that_joined_another_is_not_used_again() -> No
     assert mapper.finish().components == [0]
 
 
-class Slow(JoinsAll):
-    """Is not ready until it is told to be; nobody may wait for it."""
-
-    is_ready = False
-
-    def take(self) -> BackendResult:
-        """Fail where somebody waits."""
-        assert self.is_ready, "a scan has waited"
-        return super().take()
-
-
-def test_live_no_scan_waits_for_a_submap_to_be_settled_and_the_next_one_grows_on() -> None:
-    backend = Slow()
-    mapper = Mapper("a", backend=backend, live=True)
-    scans, _ = scans_along(BUILDING, TOUR, 1)
-    for scan in scans[:-1]:
-        assert mapper.add(scan).placed
-    assert len(mapper.robot_map().submaps) == 2  # the first, and one that grows
-    backend.is_ready = True
-    assert mapper.add(scans[-1]).submap_finished
-
-
 class CutsTheSecond:
     """Cuts the second submap in two, and leaves all else as it is."""
 

@@ -9,7 +9,7 @@ from numpy.random import Generator
 from mapweave.evidence import Evidence
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.loop_closing import LoopCloser
+from mapweave.mapping.loops.loop_closing import LoopCloser
 from mapweave.maps import Alignment, LineMap, RobotMap, SharedPlace, Submap, Trajectory
 from mapweave.reasons import Reason
 from mapweave.team.alignment_graph import Cluster

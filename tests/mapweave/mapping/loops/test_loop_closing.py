@@ -9,7 +9,7 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.loop_closing import LoopCloser, LoopParameters
+from mapweave.mapping.loops.loop_closing import LoopCloser, LoopParameters
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import LineMap, Submap, Trajectory
 from tests.mapweave.buildings import (

@@ -6,7 +6,7 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.pose_graph import Constraint, optimise
+from mapweave.mapping.loops.pose_graph import Constraint, optimise
 from tests.mapweave.buildings import random_pose
 
 TRACKING = np.diag([0.03**2, 0.03**2, 0.005**2])

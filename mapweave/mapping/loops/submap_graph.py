@@ -15,7 +15,7 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.mapping.continuation import links_to_keep
 from mapweave.mapping.drifted_paths import beyond
-from mapweave.mapping.pose_graph import Constraint, optimise
+from mapweave.mapping.loops.pose_graph import Constraint, optimise
 from mapweave.maps import Submap, Trajectory
 
 CLOSURE_LENGTH = 2.0  # [m] of tracked path that errs about as much as a closure

@@ -15,8 +15,8 @@ from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.pose_graph import Constraint
-from mapweave.mapping.submap_graph import SubmapGraph, SubmapGraphParameters
+from mapweave.mapping.loops.pose_graph import Constraint
+from mapweave.mapping.loops.submap_graph import SubmapGraph, SubmapGraphParameters
 from mapweave.maps import LineMap, Submap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.hypotheses import HypothesisParameters, different

@@ -8,8 +8,8 @@ import pytest
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.pose_graph import Constraint
-from mapweave.mapping.submap_graph import CLOSURE_LENGTH, SubmapGraph, SubmapGraphParameters
+from mapweave.mapping.loops.pose_graph import Constraint
+from mapweave.mapping.loops.submap_graph import CLOSURE_LENGTH, SubmapGraph, SubmapGraphParameters
 from mapweave.maps import LineMap, Submap, Trajectory
 
 SURE = np.diag([0.02, 0.02, 0.003]) ** 2

@@ -1,0 +1,1 @@
+"""Loops closed, and the graph of poses they hang on."""
