@@ -93,17 +93,31 @@ def _tracking(off: FloatArray, p: MultiviewIcpParameters) -> FloatArray:
     """(3n, 3n) normal matrix of the n - 1 tracked steps and of the first pose.
 
     Of small corrections in the common frame: neighbours move and turn alike. Tracking may have put
-    a scan into another minimum, beside the true one: the farther off a step is by what the other
-    scans say, the less it counts, as a pair of points does. The (n, 3) `off` is how far the poses
+    a scan into another minimum, beside the true one: the farther off both steps are, to it and
+    from it, by what the other scans say, the less they count, as a pair of points does, and the
+    scans before and after it are held to each other instead. One step alone is not given up: all
+    that follows would hang on nothing, and turn as a whole. The (n, 3) `off` is how far the poses
     are from where tracking put them [m, m, rad].
     """
-    sigmas = np.tile([p.step_sigma, p.step_sigma, p.turn_sigma], (len(off), 1))
-    sigmas[0] = [p.start_sigma, p.start_sigma, p.start_turn]
-    wrong = np.diff(off, axis=0, prepend=off[:1]) / sigmas  # the first pose is held as it is
-    weight = (1 + (wrong**2).sum(axis=1) / p.step_doubt**2) ** -2
-    held = (weight[:, None] * sigmas**-2).ravel()
-    matrix = np.diag(held)
-    later = np.arange(3, 3 * len(off))
-    matrix[later - 3, later - 3] += held[3:]
-    matrix[later - 3, later] = matrix[later, later - 3] = -held[3:]
+    sigmas = np.array([p.step_sigma, p.step_sigma, p.turn_sigma])
+    wrong = ((np.diff(off, axis=0) / sigmas) ** 2).sum(axis=1)
+    weight = (1 + wrong / p.step_doubt**2) ** -2
+    beside = np.minimum(np.r_[1.0, weight[:-1]], np.r_[weight[1:], 1.0])  # what comes later, too
+    kept = np.maximum(weight, beside)
+    matrix = np.zeros((off.size, off.size))
+    matrix[:3, :3] = np.diag(np.array([p.start_sigma, p.start_sigma, p.start_turn]) ** -2)
+    _hold(matrix, 1, kept[:, None] * sigmas**-2)
+    over = (1 - kept[:-1]) * (1 - kept[1:])
+    _hold(matrix, 2, over[:, None] * sigmas**-2 / 2)
     return matrix
+
+
+def _hold(matrix: FloatArray, apart: int, precision: FloatArray) -> None:
+    """Add to a normal matrix that poses so many scans `apart` move alike, by (m, 3) `precision`."""
+    before = np.arange(precision.size)
+    after = before + 3 * apart
+    held = precision.ravel()
+    matrix[before, before] += held
+    matrix[after, after] += held
+    matrix[before, after] -= held
+    matrix[after, before] -= held

@@ -9,7 +9,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.tracking.observation import ObservationParameters, observe
 from mapweave.maps import LineMap
 from mapweave.matching.multiview_icp import MultiviewIcpParameters, refine
-from mapweave.scan.points import OrientedPoints, points_on_lines
+from mapweave.scan.points import OrientedPoints, join_points, points_on_lines
 from tests.mapweave.buildings import BUILDING, FRONT, cast, line_map, random_pose, tour, walls_of
 
 SIGMAS = np.array([0.03, 0.03, 0.01])  # [m, m, rad] by which each scan is off
@@ -102,3 +102,19 @@ def test_along_a_bare_corridor_the_tracked_steps_are_kept() -> None:
     found = refine(oriented, tracked, bare, MultiviewIcpParameters(max_points=100))
     np.testing.assert_allclose(found[:, 0], tracked[:, 0], atol=0.01)
     assert np.abs(found[:, 1]).max() < 0.5 * 0.03
+
+
+def test_what_follows_does_not_come_off_where_one_step_is_far_off() -> None:
+    """Two rooms, one of which was mapped 0.5 m aside: the path between them bends, all along."""
+    room = line_map(
+        np.array([[-3.0, -2, 3, -2], [3, -2, 3, 2], [3, 2, -3, 2], [-3, 2, -3, -2]]), ()
+    )
+    sight, other, aside = points_on_lines(room, 0.1)[0], np.array([50.0, 0, 0]), 0.5
+    tracked = np.array([[0.1 * k, 0.0, 0.0] for k in range(10)])
+    seen = [sight.moved(se2.inverse(pose)) for pose in tracked[:5]]
+    seen += [sight.moved(se2.between(pose, other)) for pose in tracked[5:]]
+    mapped = join_points([sight, sight.moved(other + np.array([aside, 0.0, 0.0]))])
+    p = MultiviewIcpParameters(noise=0.5, scales=(1e3,) * 8, partners=60)
+    moved = (refine(seen, tracked, mapped, p) - tracked)[:, 0]
+    assert moved[-1] > 0.3
+    assert np.diff(moved).max() < 0.25 * aside
