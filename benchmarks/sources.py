@@ -1,8 +1,9 @@
 """A log replayed through every source: the same scans placed, where the file's scans are.
 
 Each source is an agent as a process (`Agent.feed`: in this one), beside a router. A recording is
-played as fast as can be; to the others each scan is given when the one before it is mapped, so that
-none is skipped however slow the machine is, and the agent maps as live ones do. Compared are the
+played as fast as can be; to the others each scan is given at its time, `--speed` times as fast as
+the robot drove, and not before the one before it is mapped, so that none is skipped however slow
+the machine is, and the agent maps as live ones do. Compared are the
 poses that are said scan by scan with those that the same scans have in one process, and where the
 submaps lie in the end. Messages hold ranges and angles as 32-bit numbers: all sources but the log
 itself are compared with a bag of the log; how much the rounding does is a row of its own.
@@ -48,6 +49,7 @@ from mapweave_protocol.wire.messages import PoseMessage, StatusMessage
 TEAM, ROBOT = "sources", "r1"
 MAPWEAVE = str(Path(sys.executable).with_name("mapweave"))
 PATIENCE = 600.0  # [s]
+SPEED = 8.0  # times real time
 UNSAID = 60.0  # [s] after which a scan is taken to be mapped of which no pose is said
 FURTHEST, TURNED = 0.01, 0.1  # [m], [°] off the file's: the bar
 ITSELF, ROUNDED = "the log itself", "rounded, as in a bag"
@@ -101,6 +103,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--logs", nargs="+", default=["fr079"], metavar="NAME")
     parser.add_argument("--scans", type=int, default=sys.maxsize, metavar="N", help="the first N")
     parser.add_argument("--only", default="", metavar="WORD", help="sources that WORD is a part of")
+    parser.add_argument(
+        "--speed", type=float, default=SPEED, metavar="X", help=f"times real time, live ({SPEED:g})"
+    )
 
 
 def run(options: argparse.Namespace) -> None:
@@ -111,7 +116,7 @@ def run(options: argparse.Namespace) -> None:
         expected = _mapped(scans)
         rounded = _mapped(_rounded(scans))
         outcomes.append(_compared(log.name, ROUNDED, expected, rounded, 0))
-        for name, replay in _sources(log.path).items():
+        for name, replay in _sources(log.path, options.speed).items():
             if options.only in name:
                 of_file = expected if name == ITSELF else rounded
                 outcomes.append(_compared(log.name, name, of_file, *_replayed(replay, scans)))
@@ -215,16 +220,16 @@ class Place:
 Replay = Callable[[Place, Sequence[Scan]], int]
 
 
-def _sources(log: Path) -> dict[str, Replay]:
+def _sources(log: Path, speed: float) -> dict[str, Replay]:
     """Return by its name what replays scans, and returns how many were skipped."""
     return {
         ITSELF: partial(_recording, lambda _folder, _scans: log),
         "bag of ROS 1": partial(_recording, ros1_bag),
         "bag of ROS 2, db3": partial(_recording, partial(ros2_bag, StoragePlugin.SQLITE3)),
         "bag of ROS 2, mcap": partial(_recording, partial(ros2_bag, StoragePlugin.MCAP)),
-        **{name: partial(_topic, key) for name, key in NATIVE.items()},
-        "lines of JSON": _lines,
-        "Agent.feed": _fed,
+        **{name: partial(_topic, key, speed) for name, key in NATIVE.items()},
+        "lines of JSON": partial(_lines, speed),
+        "Agent.feed": partial(_fed, speed),
     }
 
 
@@ -249,24 +254,33 @@ def _recording(
         return place.wait_until_finished()
 
 
-def _topic(key: str, place: Place, scans: Sequence[Scan]) -> int:
+def _live(scans: Sequence[Scan], speed: float) -> Iterator[Scan]:
+    """Yield each scan not before its time, so many times as fast as the robot drove."""
+    begun = time.monotonic()
+    for scan in scans:
+        due = begun + (scan.stamp - scans[0].stamp) / speed
+        time.sleep(max(0.0, due - time.monotonic()))
+        yield scan
+
+
+def _topic(key: str, speed: float, place: Place, scans: Sequence[Scan]) -> int:
     publisher = place.publisher(key)
     with place.agent("--source", "ros2:/scan?domain=0", "--scans", f":{len(scans)}"):
         matching: Any = publisher.matching_status  # its stub says bool
         while not matching.matching:
             time.sleep(0.1)
             matching = publisher.matching_status
-        for index, scan in enumerate(scans):
+        for index, scan in enumerate(_live(scans, speed)):
             publisher.put(bytes(ROS2.serialize_cdr(laser_scan(ROS2, scan), LASER_SCAN)))
             place.wait_until_mapped(index)
         return place.wait_until_finished()
 
 
-def _lines(place: Place, scans: Sequence[Scan]) -> int:
+def _lines(speed: float, place: Place, scans: Sequence[Scan]) -> int:
     with place.agent("--source", "-", stdin=subprocess.PIPE) as process:
         assert process.stdin is not None
         place.wait_until_here()
-        for index, scan in enumerate(scans):
+        for index, scan in enumerate(_live(scans, speed)):
             line = {"stamp": scan.stamp, "ranges": ranges_of(scan).tolist(), **angles_of(scan)}
             process.stdin.write(json.dumps(line).replace("Infinity", "null") + "\n")
             process.stdin.flush()
@@ -275,11 +289,11 @@ def _lines(place: Place, scans: Sequence[Scan]) -> int:
         return place.wait_until_finished()
 
 
-def _fed(place: Place, scans: Sequence[Scan]) -> int:
+def _fed(speed: float, place: Place, scans: Sequence[Scan]) -> int:
     with mapweave_agent.Agent(
         ROBOT, TEAM, connect=place.endpoint, state=place.state, patience=PATIENCE
     ) as agent:
-        for index, scan in enumerate(scans):
+        for index, scan in enumerate(_live(scans, speed)):
             agent.feed(ranges_of(scan), stamp=scan.stamp, **angles_of(scan))
             place.wait_until_mapped(index)
     return agent.skipped

@@ -16,7 +16,7 @@ from mapweave.mapping.backend import BackendResult, BackendRunner, FinishedSubma
 from mapweave.mapping.map_snapshot import Unsettled, with_walls
 from mapweave.maps import Submap
 
-MOST_LATE = 8  # finished submaps that queue; the growing one grows on then
+MOST_LATE = 64  # finished submaps that queue, minutes of driving; the growing one grows on then
 
 
 @dataclass(frozen=True, slots=True, eq=False)
