@@ -117,7 +117,7 @@ def test_a_submap_is_handed_over_where_it_is_since_those_before_it_settled(
     poses = [np.array([f.submap.pose for f in each.handed_over]) for each in (late, on_time)]
     assert len(poses[0]) >= 6
     assert poses[1][-1, 1] > 5 * MOVED  # all that settled before it moved it
-    np.testing.assert_allclose(*poses, atol=0.01)
+    np.testing.assert_allclose(poses[0], poses[1], atol=0.01)
 
 
 def test_a_robot_that_is_lost_while_submaps_wait_shares_no_number_with_what_it_leaves() -> None:
