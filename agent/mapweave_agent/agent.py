@@ -3,7 +3,7 @@
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from itertools import chain
 
 import zenoh
@@ -20,6 +20,7 @@ from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.listening import listening
 from mapweave_agent.live.attending import attending
+from mapweave_agent.live.joining import Connected
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -56,8 +57,9 @@ class AgentRun:
 
     Parameters
     ----------
-    session
-        An open session; it stays the caller's.
+    connected
+        Returns an open session, which stays the caller's, once there is one: until then the robot
+        maps by itself.
     team
         The team's id.
     mapper
@@ -78,7 +80,7 @@ class AgentRun:
 
     def __init__(
         self,
-        session: zenoh.Session,
+        connected: Connected,
         team: str,
         mapper: ScanMapper,
         comparer: ComparisonWorker,
@@ -89,7 +91,9 @@ class AgentRun:
         first: int = 0,
         tell: Tell = lambda _: None,
     ) -> None:
-        self._session = session
+        self._connected = connected
+        self._session: zenoh.Session | None = None
+        self._joined = ExitStack()
         self._team = team
         self._mapper = mapper
         self._total = total
@@ -117,7 +121,7 @@ class AgentRun:
             self._whereabouts,
             self._orders,
         )
-        self._outbox = Outbox(session, team, mapper.robot, mapper.boot, state.sender)
+        self._outbox = Outbox(team, mapper.robot, mapper.boot, state.sender)
         self._findings = Findings(
             self._map,
             comparer,
@@ -181,12 +185,28 @@ class AgentRun:
 
     @contextmanager
     def _in_the_team(self) -> Iterator[None]:
-        robot, put = self._mapper.robot, self._inbox.put
-        with self._outbox, listening(self._session, self._team, robot, put):
-            _log.info("joins team %s", self._team)
+        with self._joined:
+            self._join_when_possible()
+            if self._session is None:
+                _log.info("maps by itself until a router answers")
             yield
             if self._reception.refused:
                 _log.warning("%d messages were not valid and ignored", self._reception.refused)
+
+    def _join_when_possible(self) -> None:
+        """Come to the team once there is a session, with what was mapped before."""
+        session = self._connected() if self._session is None else None
+        if session is None:
+            return
+        keep, robot, put = self._joined.enter_context, self._mapper.robot, self._inbox.put
+        keep(self._outbox.open(session))
+        keep(listening(session, self._team, robot, put))
+        self._session = session
+        _log.info("joins team %s", self._team)
+        if self._map.state is not None:
+            self._outbox.send_map(self._map.told, complete=True)
+        if self._map.marks.state is not None:
+            self._outbox.send_marks(self._map.marks.message())
 
     def _compare_until(self, stopping: Stopping) -> None:
         if not stopping():
@@ -252,6 +272,7 @@ class AgentRun:
                 break
             self._reception.take(arrival)
             timeout = 0.0
+        self._join_when_possible()
         now = time.monotonic()
         if self._reception.met():
             self._statuses.met(now)
@@ -277,6 +298,8 @@ class AgentRun:
 
     def _supply(self, now: float) -> None:
         """Send again what others lack, answer who has asked, and ask for what is lacking here."""
+        if self._session is None:
+            return
         # Gone through where somebody has spoken since the last time: seldom.
         past = chain.from_iterable(run.found for run in self._past.values())
         found = chain(past, self._comparisons.orphans, self._outbox.found)

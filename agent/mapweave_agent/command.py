@@ -3,6 +3,8 @@
 import argparse
 import logging
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +30,7 @@ from mapweave.io.sources import ScanSource, open_source
 from mapweave.maps import RobotMap
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.comparison_worker import ComparisonWorker
+from mapweave_agent.live.joining import Connected, connecting
 from mapweave_agent.live.ros2_output import output_of
 from mapweave_agent.live.scans import scans_of
 from mapweave_agent.publication_schedule import AgentParameters
@@ -41,6 +44,7 @@ from mapweave_protocol.link.arguments import (
 )
 from mapweave_protocol.link.security.membership import check_member
 from mapweave_protocol.link.security.roster import Member, Role
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.link.stopping import stop_on_signal
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
@@ -156,13 +160,13 @@ def _run(options: argparse.Namespace) -> int:
         output as tell,
         ComparisonWorker(compare) as comparer,
         mapper_of(start, robot, new_boot(), config, live=live) as mapper,
-        open_session(endpoints, on_wait=partial(tell_waiting, _log), link=link) as session,
+        _connection(source, endpoints, link) as connected,
     ):
         parameters = AgentParameters(map_interval=options.map_interval)
         past = earlier.young(options.resume_within)
-        first = earlier.first_component(session, team, robot)
+        first = earlier.first_component(connected(), team, robot)
         run = AgentRun(
-            session, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
+            connected, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
         )
         try:
             with spared():
@@ -170,6 +174,20 @@ def _run(options: argparse.Namespace) -> int:
         finally:  # also where its source has failed
             _write(run.robot_map, options.output)
     return 0
+
+
+@contextmanager
+def _connection(
+    source: ScanSource, endpoints: tuple[str, ...], link: LinkSettings
+) -> Iterator[Connected]:
+    """Give a block the team's session: a recording waits for it, a robot that drives does not."""
+    on_wait = partial(tell_waiting, _log)
+    if source.live:
+        with connecting(endpoints, on_wait, link) as connected:
+            yield connected
+    else:
+        with open_session(endpoints, on_wait=on_wait, link=link) as session:
+            yield lambda: session
 
 
 def _write(robot_map: RobotMap, path: Path | None) -> None:

@@ -2,9 +2,8 @@
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
-from types import TracebackType
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 
 import zenoh
 import zenoh.ext as ze
@@ -39,24 +38,25 @@ _log = logging.getLogger(__name__)
 
 
 class Outbox:
-    """The publishers and the liveliness token of a run of a robot; a context manager.
+    """The publishers and the liveliness token of a run of a robot.
+
+    What is sent before it is `open` goes nowhere, as in an outage.
 
     Parameters
     ----------
-    session
-        Stays the caller's.
     sender
         Codes the maps.
     """
 
-    def __init__(
-        self, session: zenoh.Session, team: str, robot: str, boot: str, sender: MapSender
-    ) -> None:
-        self._session = session
+    def __init__(self, team: str, robot: str, boot: str, sender: MapSender) -> None:
+        self._session: zenoh.Session | None = None
         self._team = team
         self._robot = robot
         self._boot = boot
         self._sender = sender
+        self._maps: ze.AdvancedPublisher | None = None
+        self._poses: zenoh.Publisher | None = None
+        self._statuses: zenoh.Publisher | None = None
         self._alignments: dict[tuple[str, str], ze.AdvancedPublisher] = {}
         self._found: dict[frozenset[Run], AlignmentMessage] = {}
         self._marks: ze.AdvancedPublisher | None = None
@@ -65,32 +65,26 @@ class Outbox:
         self._bytes = Counter[Kind]()
         self._declared = ExitStack()
 
-    def __enter__(self) -> "Outbox":
-        with ExitStack() as stack:
+    @contextmanager
+    def open(self, session: zenoh.Session) -> Iterator[None]:
+        """Declare all on `session`, which stays the caller's, as long as the block runs."""
+        self._session = session
+        with self._declared as stack:
             keep = stack.enter_context
             query_key = AGENT_QUERY.build(team=self._team, robot=self._robot)
             map_key = MAP.build(team=self._team, robot=self._robot)
             status_key = STATUS.build(team=self._team, robot=self._robot)
             live_key = LIVE.build(team=self._team, robot=self._robot, boot=self._boot)
-            self._maps = keep(declare_map_publisher(self._session, map_key))
+            self._maps = keep(declare_map_publisher(session, map_key))
             pose_key = POSE.build(team=self._team, robot=self._robot)
-            self._poses = keep(declare_pose_publisher(self._session, pose_key))
-            self._statuses = keep(declare_status_publisher(self._session, status_key))
+            self._poses = keep(declare_pose_publisher(session, pose_key))
+            self._statuses = keep(declare_status_publisher(session, status_key))
             questions: zenoh.handlers.RingChannel[zenoh.Query]
             questions = zenoh.handlers.RingChannel(WAITING_QUERIES)
-            self._asked = keep(self._session.declare_queryable(query_key, questions))
+            self._asked = keep(session.declare_queryable(query_key, questions))
             # Last, so that who sees the robot can already hear it.
-            keep(self._session.liveliness().declare_token(live_key))
-            self._declared = stack.pop_all()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._declared.close()
+            keep(session.liveliness().declare_token(live_key))
+            yield
 
     @property
     def sent(self) -> Mapping[Kind, Traffic]:
@@ -124,21 +118,21 @@ class Outbox:
 
     def send_marks(self, message: MarksMessage) -> None:
         """Publish the marks of a run of the robot, all of them."""
-        if self._marks is None:  # most robots mark nothing
+        if self._marks is None and self._session is not None:  # most robots mark nothing
             key = MARK.build(team=self._team, robot=self._robot)
             self._marks = declare_marks_publisher(self._session, key)
             self._declared.enter_context(self._marks)
         self._marked[message.boot] = message
         self._put("mark", self._marks, encode(message))
 
-    def prepare_alignments(self, reference: str, other: str) -> ze.AdvancedPublisher:
+    def prepare_alignments(self, reference: str, other: str) -> ze.AdvancedPublisher | None:
         """Return the publisher of what is found out about a pair of robots.
 
         Whoever listens asks a publisher that is new for what it has published: it is best declared
         while there is nothing, or the first message goes to each of them twice.
         """
         publisher = self._alignments.get((reference, other))
-        if publisher is None:
+        if publisher is None and self._session is not None:
             key = self._key_of(reference, other)
             publisher = declare_alignment_publisher(self._session, key)
             self._alignments[reference, other] = self._declared.enter_context(publisher)
@@ -204,8 +198,10 @@ class Outbox:
         return ALIGNMENT.build(team=self._team, robot=self._robot, reference=reference, other=other)
 
     def _put(
-        self, kind: Kind, publisher: ze.AdvancedPublisher | zenoh.Publisher, payload: bytes
+        self, kind: Kind, publisher: ze.AdvancedPublisher | zenoh.Publisher | None, payload: bytes
     ) -> None:
+        if publisher is None:
+            return
         publisher.put(payload)
         self._messages[kind] += 1
         self._bytes[kind] += len(payload)

@@ -247,7 +247,7 @@ class Agent:
             mapper_of(self._start, self._robot, new_boot(), self._config, live=True)
         )
         return AgentRun(
-            session,
+            lambda: session,
             self._team,
             mapper,
             comparer,

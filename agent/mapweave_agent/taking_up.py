@@ -54,9 +54,13 @@ class EarlierRuns(NamedTuple):
         """Return those that ended at most `within` [s] ago."""
         return young_enough(self.runs, within)
 
-    def first_component(self, session: zenoh.Session, team: str, robot: str) -> int:
-        """Return a component number above all known ones, here and at the coordinator."""
-        return first_component([*(run.map for run in self.runs), *_held(session, team, robot)])
+    def first_component(self, session: zenoh.Session | None, team: str, robot: str) -> int:
+        """Return a component number above all known ones, here and at the coordinator.
+
+        Without a session only those here are known; they are all, unless the disk is another one.
+        """
+        held = [] if session is None else _held(session, team, robot)
+        return first_component([*(run.map for run in self.runs), *held])
 
 
 def _held(session: zenoh.Session, team: str, robot: str) -> list[RobotMap]:

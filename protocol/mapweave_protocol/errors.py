@@ -74,3 +74,4 @@ class UnreachableError(MapweaveError):
         )
         self.endpoints = endpoints
         self.seconds = seconds
+        self.reason = reason

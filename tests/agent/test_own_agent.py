@@ -2,10 +2,12 @@
 
 import json
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -20,7 +22,7 @@ from mapweave.mapping.mapper import Mapper
 from mapweave.maps import RobotMap
 from mapweave.scan.scan import Scan
 from mapweave_agent.agent import AgentRun
-from mapweave_agent.past_runs import StateFolder
+from mapweave_agent.past_runs import StateFolder, default_folder
 from mapweave_agent.publication_schedule import AgentParameters, PublicationSchedule
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
@@ -33,6 +35,19 @@ HALF_A_STEP = 0.501 / PER_METRE  # [m] of the poses of scans on the wire
 
 def scans_of(log: Path) -> list[Scan]:
     return list(read_scans(log))[:SCANS]
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
 
 
 def as_line(scan: Scan) -> str:
@@ -106,6 +121,47 @@ def test_an_agent_that_is_interrupted_leaves_its_map_to_go_on_from(
     for scan in scans:
         mapper.add(scan)
     assert mapper.finish().components == [0]
+
+
+def test_a_robot_that_drives_before_there_is_a_router_maps_and_is_in_its_team_once_there_is(
+    team: str, logs: list[Path]
+) -> None:
+    scans, later = scans_of(logs[0]), f"tcp/127.0.0.1:{free_port()}"
+    where = ["--robot", "a", "--team", team, "--connect", later, "--source", "-", "--rate", "max"]
+    with subprocess.Popen([MAPWEAVE, "agent", *where], stdin=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None
+        process.stdin.write("".join(f"{as_line(scan)}\n" for scan in scans))
+        process.stdin.close()
+        state = StateFolder(default_folder(team, "a"))
+        until(lambda: any(last_scan(run.map) == SCANS - 1 for run in state.runs("a", time.time())))
+        with (
+            subprocess.Popen([MAPWEAVE, "router", "--listen", later]) as router,
+            open_session([later], patience=PATIENCE) as session,
+        ):
+            listener = Listener(session, team)
+            listener.until(lambda: listener.finished("a"))
+            process.terminate()
+            assert process.wait(PATIENCE) == 0
+            router.terminate()
+    assert_mapped(listener.maps["a"], scans)
+    assert listener.statuses["a"].scans_seen == SCANS
+
+
+def test_a_robot_whose_router_never_comes_leaves_its_map_when_it_is_interrupted(
+    team: str, logs: list[Path], tmp_path: Path
+) -> None:
+    file = tmp_path / "r1.json"
+    where = ["--robot", "a", "--team", team, "--connect", "tcp/127.0.0.1:1", "--source", "-"]
+    where += ["--rate", "max", "--output", str(file)]
+    with subprocess.Popen([MAPWEAVE, "agent", *where], stdin=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None
+        process.stdin.write("".join(f"{as_line(scan)}\n" for scan in scans_of(logs[0])))
+        process.stdin.flush()
+        state = StateFolder(default_folder(team, "a"))
+        until(lambda: bool(state.runs("a", time.time())))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+    assert read_map(file).submaps
 
 
 def test_what_is_wrong_with_standard_input_ends_the_agent_in_one_line(

@@ -141,5 +141,6 @@ def _answer(team: str, ask: Callable[[float], T | None]) -> T:
             return answer
         time.sleep(PAUSE)
     raise OrderError(
-        f"no coordinator of team {team} answered within {PATIENCE:g} s; is one running?"
+        f"no coordinator of team {team} answered within {PATIENCE:g} s; is one running,"
+        " and is that the team (--team)?"
     )

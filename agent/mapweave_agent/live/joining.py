@@ -1,0 +1,61 @@
+"""A link to the team that comes when it comes: a robot that drives does not wait for it."""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import TypeAlias
+
+import zenoh
+
+from mapweave_protocol.errors import UnreachableError
+from mapweave_protocol.link.security.settings import LinkSettings
+from mapweave_protocol.link.session import PAUSE, open_session
+
+Connected: TypeAlias = Callable[[], zenoh.Session | None]
+"""Returns the session, None until a router has answered."""
+
+
+@contextmanager
+def connecting(
+    endpoints: Sequence[str], on_wait: Callable[[str], None], link: LinkSettings
+) -> Iterator[Connected]:
+    """Give a block the session when a router has answered, which is tried as long as it runs.
+
+    Parameters
+    ----------
+    on_wait
+        As of `open_session`; called in whatever thread.
+
+    Raises
+    ------
+    EndpointError
+        If an endpoint is not one, or there is none.
+    """
+    opened: list[zenoh.Session] = []
+    told: list[str] = []
+    over = threading.Event()
+
+    def answered() -> bool:
+        try:
+            opened.append(stack.enter_context(open_session(endpoints, patience=0.0, link=link)))
+        except UnreachableError as error:
+            if told[-1:] != [error.reason]:
+                told.append(error.reason)
+                on_wait(error.reason)
+        return bool(opened)
+
+    def connect() -> None:
+        while not over.wait(PAUSE) and not answered():
+            pass
+
+    with ExitStack() as stack:
+        # Where a router is there, or the endpoint is none, that is known before the block begins.
+        connector = None if answered() else threading.Thread(target=connect, name="connecting")
+        if connector is not None:
+            connector.start()
+        try:
+            yield lambda: opened[0] if opened else None
+        finally:
+            over.set()
+            if connector is not None:
+                connector.join()
