@@ -15,7 +15,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.kernels.matching.distinct import agreeing
 from mapweave.maps import LineMap
-from mapweave.shape.windows import Candidates, WindowParameters, Windows, all_windows, match_all
+from mapweave.shape.windows import (
+    Candidates,
+    WindowParameters,
+    Windows,
+    all_windows,
+    has_salient,
+    match_all,
+)
 
 
 class CorrespondenceParameters(BaseModel):
@@ -51,9 +58,14 @@ def correspond(
     """Return correspondences of the polylines of `seen` to those of `known`, the best first."""
     if len(known.segments) == 0 or len(seen.segments) == 0:
         return []
-    a = all_windows(known.segments, known.polyline, parameters.windows)
-    b = all_windows(seen.segments, seen.polyline, parameters.windows)
-    candidates = match_all(a, b, parameters.windows)
+    p = parameters.windows
+    cut = all_windows(seen.segments, seen.polyline, p)
+    b = tuple(windows for windows in cut if has_salient(windows, p))  # the others are like none
+    if not b:
+        return []
+    compared = p.model_copy(update={"lengths": tuple(windows.length for windows in b)})
+    a = all_windows(known.segments, known.polyline, compared)
+    candidates = match_all(a, b, p)
     if len(candidates) == 0:
         return []
     middle = seen.segments.reshape(-1, 2).mean(axis=0)

@@ -19,11 +19,13 @@ windows whose gaps or scale differ, which turn angles over arc length cannot.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 from mapweave.geometry.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from mapweave.geometry.segments import lengths
 from mapweave.kernels.matching.windows import WindowSamples, alike_windows, sample_windows
 
 
@@ -146,6 +148,11 @@ class Candidates:
         return Candidates(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
+def has_salient(windows: Windows, parameters: WindowParameters) -> bool:
+    """Whether a window is complex enough to be compared (H1)."""
+    return bool((windows.complexity >= parameters.min_complexity).any())
+
+
 def complexity_of(straightness: FloatArray) -> FloatArray:
     """(k,) complexity of windows of such a similarity (k,) to a straight line."""
     return 1 - straightness**2
@@ -169,24 +176,33 @@ def windows(
     stride
         Distance from one window to the next [m].
     """
-    steps = segments[:, 2:] - segments[:, :2]
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    # One arc length for the whole map; no window crosses polylines.
-    owner, offset, arc = _starts(polyline, lengths, length, stride)
-    codes, points = sample_windows(segments, offset + arc, length, samples)
-    return Windows(length, codes, points, owner, arc)
+    return _cut(segments, _arcs(segments, polyline), length, samples, stride)
 
 
-def _starts(
-    polyline: IntArray, lengths: FloatArray, length: float, stride: float
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return each window's polyline, the arc length before that polyline, and its own start."""
-    names, first = np.unique(polyline, return_index=True)
-    total = np.add.reduceat(lengths, first) if len(first) else np.empty(0)
-    before = np.cumsum(total) - total
-    count = np.maximum(np.floor((total - length) / stride + 1e-9).astype(np.int64) + 1, 0)
+def _cut(
+    segments: FloatArray, arcs: "_Arcs", length: float, samples: int, stride: float
+) -> Windows:
+    """Return the windows of one length; none crosses polylines."""
+    count = np.floor((arcs.total - length) / stride + 1e-9).astype(np.int64) + 1
+    count = np.maximum(count, 0)
     place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    return np.repeat(names, count), np.repeat(before, count), place * stride
+    arc = place * stride
+    codes, points = sample_windows(segments, np.repeat(arcs.before, count) + arc, length, samples)
+    return Windows(length, codes, points, np.repeat(arcs.polyline, count), arc)
+
+
+class _Arcs(NamedTuple):
+    """(p,) polylines, what of the map's arc length lies before each, and how long it is [m]."""
+
+    polyline: IntArray
+    before: FloatArray
+    total: FloatArray
+
+
+def _arcs(segments: FloatArray, polyline: IntArray) -> _Arcs:
+    first = np.flatnonzero(np.diff(polyline, prepend=polyline[:1] - 1))
+    total = np.add.reduceat(lengths(segments), first) if len(first) else np.empty(0)
+    return _Arcs(polyline[first], np.cumsum(total) - total, total)
 
 
 def all_windows(
@@ -203,10 +219,8 @@ def all_windows(
     parameters
         Arc lengths, samples and stride.
     """
-    return tuple(
-        windows(segments, polyline, length, parameters.samples, parameters.stride * length)
-        for length in parameters.lengths
-    )
+    p, arcs = parameters, _arcs(segments, polyline)
+    return tuple(_cut(segments, arcs, length, p.samples, p.stride * length) for length in p.lengths)
 
 
 def match(a: Windows, b: Windows, parameters: WindowParameters) -> Candidates:
@@ -266,8 +280,11 @@ def best(candidates: Candidates, count: int) -> Candidates:
 def _salient(straightness: FloatArray, parameters: WindowParameters) -> IntArray:
     """Return which windows are the most complex (H1), in their order on the map."""
     complexity = complexity_of(straightness)
-    ranked: IntArray = np.argsort(-complexity, kind="stable")[: parameters.max_windows]
-    return np.sort(ranked[complexity[ranked] >= parameters.min_complexity])
+    salient = np.flatnonzero(complexity >= parameters.min_complexity)
+    if len(salient) <= parameters.max_windows:
+        return salient
+    ranked: IntArray = np.argsort(-complexity[salient], kind="stable")[: parameters.max_windows]
+    return np.sort(salient[ranked])
 
 
 def _samples(windows: Windows, chosen: IntArray, straightness: FloatArray) -> WindowSamples:

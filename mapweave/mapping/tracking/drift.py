@@ -11,6 +11,7 @@ both ways, and it is counted how many of its returns then lie on no known surfac
 
 import math
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
@@ -135,7 +136,7 @@ class Drift:
         information: FloatArray,
         seen: OrientedPoints,
         known: Surroundings,
-        pace: Pace,
+        pace: Callable[[], Pace],
         unsettled: float = 0.0,
     ) -> bool:
         """Go on to a scan that was found by what is `known`; return whether it drifts.
@@ -150,6 +151,8 @@ class Drift:
             (3, 3) of `Fit`.
         seen
             Its points, sensor frame.
+        pace
+            What is not known of the step; asked only where nothing holds it.
         unsettled
             [m] along the direction that is held least, to where it may be as well.
         """
@@ -160,7 +163,7 @@ class Drift:
         if unsettled == 0:  # else what it is held by may be a look-alike
             self._return(pose, seen, known)
         opened = self._open(pose, information, seen, known)
-        self._lately.append(_Opened(known.newest, pace) if opened else None)
+        self._lately.append(_Opened(known.newest, pace()) if opened else None)
         drifts = self._drift(opened)
         if unsettled > 0:
             self._doubt(information, unsettled, known)

@@ -4,6 +4,7 @@ Returns that lie on known surfaces speak for a pose; returns inside what earlier
 and known surfaces that the new scan sees through, speak against it.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -286,9 +287,9 @@ class LocalMap:
     def _is_news(self, pose: FloatArray) -> bool:
         if self._last is None:
             return True
-        x, y, turn = se2.between(self._last, pose)
+        x, y, turn = se2.between(self._last, pose).tolist()
         p = self._parameters
-        return bool(np.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn)
+        return math.hypot(x, y) > p.keyframe_step or abs(turn) > p.keyframe_turn
 
 
 def _evidence(counts: tuple[int, int, int], through: float, count: int) -> ScanEvidence:

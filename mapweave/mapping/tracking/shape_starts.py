@@ -34,9 +34,9 @@ def shape_starts(
     parameters
         When they correspond.
     """
-    oriented, _ = points_on_lines(known, spacing)
+    (oriented, _), moving = points_on_lines(known, spacing), seen.on_lines
     for found in correspond(known, seen.lines, parameters):
-        partners_of = np.flatnonzero(found.corresponding.any(axis=1))
-        target = Target.of(oriented.at(np.isin(oriented.polyline, partners_of)), icp)
-        fit = align(seen.on_lines, target, found.transform, icp, None, found.corresponding)
+        is_partner = np.asarray(found.corresponding.any(axis=1))
+        target = Target.of(oriented.at(is_partner[oriented.polyline]), icp)
+        fit = align(moving, target, found.transform, icp, None, found.corresponding)
         yield fit.pose

@@ -8,6 +8,7 @@ things landmarks at once, as furniture is; elsewhere those that stood for a whil
 
 import math
 from collections import deque
+from itertools import islice
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -111,10 +112,10 @@ class StandingThings:
         p = self._p
         if len(self._gone) < p.judged:
             return
-        gone = np.array(self._gone)
-        if gone[-p.lately :].mean() > p.moving:
+        lately = min(p.lately, len(self._gone))
+        if sum(islice(reversed(self._gone), lately)) / lately > p.moving:
             self.are_distrusted = True
-        elif gone.mean() <= p.standing:
+        elif sum(self._gone) / len(self._gone) <= p.standing:
             self.are_distrusted = False
 
     def _is_recent(self, stamp: float, now: float) -> bool:

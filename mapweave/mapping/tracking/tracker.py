@@ -176,8 +176,9 @@ class Tracker:
 
     def _follow(self, seen: Observation, known: Callable[[], LineMap]) -> Found:
         """Go on to `seen`, where it is; miss it, where that is nowhere."""
-        relied = self._relied_on(seen, self._predictions(seen.scan)[0])
-        tracked = FIRST if self._local.is_empty else self._locate(relied, known)
+        predicted = self._predictions(seen.scan)
+        relied = self._relied_on(seen, predicted[0])
+        tracked = FIRST if self._local.is_empty else self._locate(relied, predicted, known)
         if tracked is None:
             self.missed.append(seen)
             return []
@@ -216,14 +217,13 @@ class Tracker:
     def _drifted(self, seen: Observation, tracked: ScanMatch) -> ScanMatch:
         """Note a step, and how far it may be off; return the scan where it ends, with that."""
         step = se2.between(self.pose, tracked.pose)
-        unknown = pace(seen.scan, float(step[2]), self._motion, self._reachability)
         is_open = self._drift.follow(
             (tracked.pose - self.pose)[:2],
             tracked.pose,
             tracked.information,
             self._thinned(seen),
             self._local,
-            unknown,
+            lambda: pace(seen.scan, float(step[2]), self._motion, self._reachability),
             tracked.unsettled,
         )
         if not self.missed:
@@ -243,19 +243,19 @@ class Tracker:
         self.missed = []
         return found
 
-    def _locate(self, seen: Observation, known: Callable[[], LineMap]) -> ScanMatch | None:
+    def _locate(
+        self, seen: Observation, predicted: FloatArray, known: Callable[[], LineMap]
+    ) -> ScanMatch | None:
         """Try what is likely first, then what shapes propose, then everything within reach.
 
         What is remarkable is compared with everything, however well it fits.
         """
-        p, a = self.parameters, self.parameters.acceptance
-        predicted, points = self._predictions(seen.scan), seen.oriented.points
-        wide = self._window(seen.scan)
+        a = self.parameters.acceptance
         likely_first: list[Callable[[], FloatArray]] = [
             lambda: predicted,
             lambda: self.pose[None],
             lambda: self._shape_starts(seen, known()),
-            lambda: self._local.search(points, predicted[0], p.first_window, wide),
+            lambda: self._searched(seen, predicted[0], self.parameters.first_window),
         ]
         found: list[ScanMatch] = []
         for starts in likely_first:
@@ -266,7 +266,7 @@ class Tracker:
                 if is_unremarkable(best, self._turn_to(best), a):
                     return self._beside_others(best, found)
                 break
-        found += self._reached(seen, self._local.search(points, predicted[0], np.pi, wide))
+        found += self._reached(seen, self._searched(seen, predicted[0], np.pi))
         return self._best_of_all(seen, found)
 
     def _best_of_all(self, seen: Observation, found: list[ScanMatch]) -> ScanMatch | None:
@@ -338,6 +338,10 @@ class Tracker:
         step = self.parameters.max_step
         return reach(scan, len(self.missed), step, self._motion, self._reachability)
 
+    def _searched(self, seen: Observation, near: FloatArray, max_turn: float) -> FloatArray:
+        """Poses (k, 3) about `near` (3,) where most returns lie on what was seen before."""
+        return self._local.search(seen.oriented.points, near, max_turn, self._window(seen.scan))
+
     def _window(self, scan: Scan) -> float:
         """[m] to search, each way."""
         p = self.parameters
@@ -348,10 +352,10 @@ class Tracker:
 
         Every place within reach is tried, and where the pace would lead; what both saw decides.
         """
-        p, reached = self.parameters, self._window(seen.scan)
+        p = self.parameters
         if not is_open(tracked, p.acceptance):
             return []
-        way = self._motion.way(self._turn_to(tracked))[:2]
+        way, reached = self._motion.way(self._turn_to(tracked))[:2], self._window(seen.scan)
         return self._reached(seen, slide_starts(tracked, self.pose, way, reached, p.open_step))
 
     def _shape_starts(self, seen: Observation, known: LineMap) -> FloatArray:

@@ -69,10 +69,14 @@ def mapped(scans: list[Scan]) -> FloatArray:
     return told(mapper.finish())
 
 
+def usual() -> Pace:
+    return PACE
+
+
 def drifted(scans: int, known: Endless) -> Drift:
     drift = Drift(DriftParameters())
     for k in range(scans):
-        drift.follow(np.zeros(2), np.array([0.1 * k, 0.0, 0.0]), LONG, WALL, known, PACE)
+        drift.follow(np.zeros(2), np.array([0.1 * k, 0.0, 0.0]), LONG, WALL, known, usual)
     return drift
 
 
@@ -95,7 +99,7 @@ def test_noisy_points_that_come_and_go_by_chance_hold_nothing(
 ) -> None:
     drift = Drift(DriftParameters())
     for _ in range(10):
-        drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Noisy(lost, gained), PACE)
+        drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Noisy(lost, gained), usual)
     assert drift.covariance.any() != held
 
 
@@ -103,9 +107,9 @@ def test_it_is_over_when_what_was_mapped_before_holds_the_robot_again() -> None:
     drift = drifted(40, Endless(9, 99.0))
     meanwhile = Endless(20, 2.0), Endless(20, 99.0, known_end=True)
     for known in meanwhile:  # what was mapped since goes on, or nothing ends
-        drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, known, PACE)
+        drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, known, usual)
         assert drift.covariance.any()
-    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, Endless(20, 2.0, known_end=True), PACE)
+    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, Endless(20, 2.0, known_end=True), usual)
     assert not drift.covariance.any()
 
 
@@ -113,15 +117,29 @@ def test_a_heading_that_has_drifted_moves_places_with_the_way_that_is_driven() -
     drift = Drift(DriftParameters())
     drift._covariances = np.tile(np.diag([0.0, 0.0, 0.2**2]), (2, 1, 1))
     held = Endless(9, 99.0)
-    drift.follow(np.array([3.0, 0.0]), np.array([3.0, 0.0, 0.0]), np.eye(3), WALL, held, PACE)
+    drift.follow(np.array([3.0, 0.0]), np.array([3.0, 0.0, 0.0]), np.eye(3), WALL, held, usual)
     assert drift.covariance[1, 1] ** 0.5 == pytest.approx(3.0 * 0.2)
+
+
+def test_the_pace_is_asked_only_where_nothing_holds_the_robot() -> None:
+    asked: list[Pace] = []
+
+    def pace() -> Pace:
+        asked.append(PACE)
+        return PACE
+
+    drift = Drift(DriftParameters())
+    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, Endless(9, 99.0), pace)
+    assert not asked
+    drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(9, 99.0), pace)
+    assert asked
 
 
 def test_a_slow_robot_drifts_as_well() -> None:
     slow, drift = Pace(0.004, 0.01), Drift(DriftParameters())
     for k in range(100):
         pose = np.array([0.01 * k, 0.0, 0.0])
-        drift.follow(np.zeros(2), pose, LONG, WALL, Endless(9, 99.0), slow)
+        drift.follow(np.zeros(2), pose, LONG, WALL, Endless(9, 99.0), lambda: slow)
     assert drift.covariance[0, 0] ** 0.5 == pytest.approx(100 * slow.way, rel=0.05)
 
 
@@ -129,7 +147,7 @@ def test_a_closed_loop_ends_what_had_drifted_before_and_not_what_has_since() -> 
     drift = drifted(40, Endless(9, 99.0))
     drift.mark()
     for _ in range(10):
-        drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(9, 99.0), PACE)
+        drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(9, 99.0), usual)
     drift.end()
     assert drift.covariance[0, 0] ** 0.5 == pytest.approx(10 * PACE.way)
 
@@ -158,9 +176,9 @@ def test_in_a_round_room_the_heading_is_open_and_in_a_square_one_it_is_not() -> 
 def test_a_scan_that_may_be_elsewhere_along_a_wall_may_be_off_by_half_of_that_at_once() -> None:
     """Until what was mapped before it holds the robot again, and by no more for each other one."""
     drift, ends = Drift(DriftParameters()), Endless(9, 2.0, known_end=True)
-    drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, ends, PACE, 2.0)
+    drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, ends, usual, 2.0)
     np.testing.assert_allclose(drift.covariance, np.diag([1.0, 0.0, 0.0]), atol=1e-9)
-    drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, ends, PACE, 2.0)
+    drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, ends, usual, 2.0)
     assert drift.covariance[0, 0] == pytest.approx(2.0)
-    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, ends, PACE)
+    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, ends, usual)
     assert np.abs(drift.covariance).max() < 1e-9
