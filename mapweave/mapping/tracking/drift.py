@@ -2,7 +2,8 @@
 
 Along bare walls a scan fits as well a step farther on, and in a round room turned about its middle.
 There only the pace tells how far the robot went, and what it errs by adds up, from scan to scan,
-until something holds the robot that was mapped before.
+until something holds the robot that was mapped before: it is then known where it is as surely as it
+was when that was mapped.
 
 What ICP says of a direction will not do: the normals of a wall that is round or noisy are off by
 some degrees, and hundreds of them seem to hold what none of them does. So a scan is moved there,
@@ -18,7 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints
 
@@ -43,6 +44,12 @@ class DriftParameters(StageParameters):
         " in round rooms, bare corridors and along one wall there are 4 at the most in 19 of 20"
         " scans, in recordings of offices 8 and more in as many",
     )
+    held_share: float = Field(
+        0.05,
+        gt=0,
+        lt=1,
+        description="share of the points that holds it as well: of a lidar of few beams",
+    )
     chance: float = Field(
         1.5,
         ge=0,
@@ -53,7 +60,7 @@ class DriftParameters(StageParameters):
         0.1,
         gt=0,
         lt=1,
-        description="share of the points, by which what was mapped before it drifted holds it,"
+        description="share of the points, by which what was mapped when less had drifted holds it,"
         " where it explains most of what is explained",
     )
     lately: int = Field(
@@ -66,6 +73,9 @@ class DriftParameters(StageParameters):
         description="directions are looked at that ICP says are held by less than this share",
     )
     lever: float = Field(3.0, gt=0, description="[m] at which a turn moves what is seen")
+    mapped: int = Field(
+        60, ge=1, description="times that surfaces were added, of which it is known how surely"
+    )
     forgotten: float = derived(
         lambda c: 0.2 * c.mapping.closeness, gt=0, description="[m] of drift that is none"
     )
@@ -85,6 +95,14 @@ class _Opened(NamedTuple):
     pace: Pace
 
 
+class _Mapped(NamedTuple):
+    """Surfaces up to a number, where they were seen from (2,), and what had drifted by then."""
+
+    newest: int
+    at: FloatArray
+    covariances: FloatArray
+
+
 class Surroundings(Protocol):
     """What a scan is held by."""
 
@@ -92,10 +110,11 @@ class Surroundings(Protocol):
     def newest(self) -> int:
         """The number of the newest point."""
 
-    def explained(
-        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
-    ) -> BoolArray:
-        """(k, n) which points lie within `reach` [m] of surfaces, up to point number `until`."""
+    def explained(self, points: OrientedPoints, poses: FloatArray, reach: float) -> BoolArray:
+        """(k, n) which points lie within `reach` [m] of surfaces, at each of `poses` (k, 3)."""
+
+    def explaining(self, points: OrientedPoints, poses: FloatArray, reach: float) -> IntArray:
+        """(k, n) the numbers of the points on surfaces that they lie at; -1 on none."""
 
 
 class Drift:
@@ -104,7 +123,8 @@ class Drift:
     def __init__(self, parameters: DriftParameters) -> None:
         self._p = parameters
         self._scale = np.array([1.0, 1.0, 1.0 / parameters.lever])
-        self._old = -1  # the newest point that was mapped before it drifted
+        # The last surfaces, each known as surely as it was known where the robot was.
+        self._mapped: deque[_Mapped] = deque(maxlen=parameters.mapped)
         self._lately: deque[_Opened | None] = deque(maxlen=parameters.lately)
         # Since its map began, and since `mark`.
         self._covariances: FloatArray = np.zeros((2, 3, 3))
@@ -117,17 +137,22 @@ class Drift:
     def copy(self) -> Self:
         """Return one that goes on by itself from here."""
         other = type(self)(self._p)
-        other._old, other._lately = self._old, self._lately.copy()
+        other._mapped, other._lately = self._mapped.copy(), self._lately.copy()
         other._covariances = self._covariances
         return other
 
     def mark(self) -> None:
         """Note that what was mapped so far is about to be compared with what was mapped before."""
-        self._covariances = np.stack([self._covariances[0], np.zeros((3, 3))])
+        since = np.array([1.0, 0.0])[:, None, None]
+        self._covariances = since * self._covariances
+        for k, each in enumerate(self._mapped):
+            self._mapped[k] = each._replace(covariances=since * each.covariances)
 
     def end(self) -> None:
         """Forget what had drifted at the last `mark`: what was mapped before holds it."""
         self._covariances = self._covariances[[1, 1]]
+        for k, each in enumerate(self._mapped):
+            self._mapped[k] = each._replace(covariances=each.covariances[[1, 1]])
 
     def follow(
         self,
@@ -156,26 +181,24 @@ class Drift:
         unsettled
             [m] along the direction that is held least, to where it may be as well.
         """
+        if not self._mapped or self._mapped[-1].newest < known.newest:
+            self._mapped.append(_Mapped(known.newest, pose[:2] - step, self._covariances))
         if self.covariance.any():
-            carried = np.eye(3)
-            carried[:2, 2] = -step[1], step[0]
-            self._covariances = carried @ self._covariances @ carried.T
+            self._covariances = _carried(self._covariances, step)
         if unsettled == 0:  # else what it is held by may be a look-alike
             self._return(pose, seen, known)
         opened = self._open(pose, information, seen, known)
         self._lately.append(_Opened(known.newest, pace()) if opened else None)
         drifts = self._drift(opened)
         if unsettled > 0:
-            self._doubt(information, unsettled, known)
+            self._doubt(information, unsettled)
         return drifts or unsettled > 0
 
-    def _doubt(self, information: FloatArray, unsettled: float, known: Surroundings) -> None:
+    def _doubt(self, information: FloatArray, unsettled: float) -> None:
         """Grow along the direction that is held least: it is here, or so far away as well [m].
 
         Which of both, does not depend on what it was the last time.
         """
-        if not self.covariance.any():
-            self._old = known.newest
         along = np.append(np.linalg.eigh(information[:2, :2])[1][:, 0], 0.0)
         self._covariances = self._covariances + (unsettled / 2) ** 2 * np.outer(along, along)
 
@@ -187,15 +210,22 @@ class Drift:
         lately = [each for each in self._lately if each is not None]
         if not opened or 2 * len(lately) <= self._p.lately:
             return False
-        pace = lately[-1].pace
-        if not self.covariance.any():
-            self._old = lately[0].newest
+        pace, begins = lately[-1].pace, not self.covariance.any()
+        if begins:
             pace = Pace(
                 sum(each.pace.way for each in lately), sum(each.pace.turn for each in lately)
             )
         for direction in opened:
             self._grow(direction, pace)
+        if begins:
+            self._date_back(lately[0].newest)
         return True
+
+    def _date_back(self, newest: int) -> None:
+        """Note that what was mapped after a number was mapped while it drifted already."""
+        for k, each in enumerate(self._mapped):
+            if each.newest > newest:
+                self._mapped[k] = each._replace(covariances=self._covariances)
 
     def _open(
         self, pose: FloatArray, information: FloatArray, seen: OrientedPoints, known: Surroundings
@@ -205,38 +235,69 @@ class Drift:
         strength, axes = np.linalg.eigh(scale[:, None] * information * scale)
         suspected = strength[:2] <= self._p.suspicious * strength[2]
         found = [scale * axes[:, k] for k in np.flatnonzero(suspected)]
-        return [
-            each
-            for each in found
-            if self._missing(each, pose, seen, known, known.newest) < self._p.held
-        ]
+        return [each for each in found if not self._holds(each, pose, seen, known)]
 
-    def _return(self, pose: FloatArray, seen: OrientedPoints, known: Surroundings) -> None:
-        """Forget what has drifted along directions in which old surfaces hold `seen` again."""
-        steady = not any(self._lately)
-        for direction, sigma in self._axes():
-            little = steady and sigma < self._p.forgotten
-            if little or self._is_back(direction, pose, seen, known):
-                metric = direction / self._scale**2
-                left = np.eye(3) - np.outer(direction, metric) / (direction @ metric)
-                self._covariances = left @ self._covariances @ left.T
-
-    def _is_back(
+    def _holds(
         self, direction: FloatArray, pose: FloatArray, seen: OrientedPoints, known: Surroundings
     ) -> bool:
-        """Whether what was mapped before it drifted holds it along a `direction` (3,).
+        """Whether what is `known` holds `seen` along a `direction` (3,)."""
+        poses = self._aside(direction, pose, seen)
+        explained = known.explained(seen, poses, self._p.reach)
+        return self._missing(explained) >= self._enough(seen)
 
-        It is most of what explains the scan, and does so there alone, as all that is known does.
+    def _enough(self, seen: OrientedPoints) -> float:
+        """How many points hold a scan."""
+        return min(self._p.held, self._p.held_share * len(seen))
+
+    def _return(self, pose: FloatArray, seen: OrientedPoints, known: Surroundings) -> None:
+        """Take back what has drifted along directions in which older surfaces hold `seen` again.
+
+        It is known where the robot is as surely as it was when these were seen first.
         """
-        here, reach = pose[None], self._p.reach
-        old, of_all = (
-            known.explained(seen, here, reach, k).sum() for k in (self._old, known.newest)
-        )
-        enough = max(self._p.held, self._p.returned * len(seen))
-        return 2 * old > of_all and all(
-            self._missing(direction, pose, seen, known, until) >= enough
-            for until in (self._old, known.newest)
-        )
+        steady = not any(self._lately)
+        for direction, sigma in self._axes():
+            if steady and sigma < self._p.forgotten:
+                self._replace(direction, np.zeros((2, 3, 3)))
+                continue
+            then = self._then(direction, sigma, pose, seen, known)
+            if then is not None:
+                self._replace(direction, then)
+
+    def _replace(self, direction: FloatArray, covariances: FloatArray) -> None:
+        """Take along a `direction` (3,) what has drifted from `covariances` (2, 3, 3)."""
+        along = np.outer(direction, direction / self._scale**2)
+        others = np.eye(3) - along
+        self._covariances = others @ self._covariances @ others.T + along @ covariances @ along.T
+
+    def _then(
+        self,
+        direction: FloatArray,
+        sigma: float,
+        pose: FloatArray,
+        seen: OrientedPoints,
+        known: Surroundings,
+    ) -> FloatArray | None:
+        """Return the covariances (2, 3, 3) when what holds it along a `direction` (3,) was mapped.
+
+        That is most of what explains the scan, and does so there alone, as all that is known does.
+        None where nothing holds it, or the same had drifted then: a `sigma` [m] at the lever.
+        """
+        number = known.explaining(seen, self._aside(direction, pose, seen), self._p.reach)
+        on_any = number >= 0
+        if not on_any[0].any():
+            return None
+        metric = direction / self._scale**2
+        then = [_carried(each.covariances, pose[:2] - each.at) for each in self._mapped]
+        drifted = np.sqrt(np.maximum(metric @ np.array(then)[:, 0] @ metric, 0.0))
+        mapped = np.searchsorted([each.newest for each in self._mapped], number)
+        at = np.where(on_any, drifted[np.minimum(mapped, len(drifted) - 1)], np.inf)
+        most = np.sort(at[0, on_any[0]])[np.count_nonzero(on_any[0]) // 2]
+        if most > sigma - self._p.forgotten:
+            return None
+        enough = max(self._enough(seen), self._p.returned * len(seen))
+        if min(self._missing(at <= most), self._missing(on_any)) < enough:
+            return None
+        return then[int(np.flatnonzero(drifted == most)[0])]
 
     def _axes(self) -> list[tuple[FloatArray, float]]:
         """Return the motions (3,) along which it has drifted, and by how much [m] at the lever."""
@@ -250,23 +311,19 @@ class Drift:
             if squares[k] > 1e-9 * squares[2]
         ]
 
-    def _missing(
-        self,
-        direction: FloatArray,
-        pose: FloatArray,
-        seen: OrientedPoints,
-        known: Surroundings,
-        until: int,
-    ) -> int:
-        """Return how many fewer points are on what is known when moved along a `direction` (3,).
-
-        None where that may be chance.
-        """
+    def _aside(self, direction: FloatArray, pose: FloatArray, seen: OrientedPoints) -> FloatArray:
+        """Return (3, 3) `pose`, and those where `seen` is moved along a `direction` (3,)."""
         arms = seen.points @ se2.rotation(pose[2]).T
         moved = direction[:2] + direction[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         step = self._p.shift / math.sqrt((moved**2).sum(axis=1).mean()) * direction
-        poses = np.array([pose, pose + step, pose - step])
-        here, *aside = known.explained(seen, poses, self._p.reach, until)
+        return np.array([pose, pose + step, pose - step])
+
+    def _missing(self, explained: BoolArray) -> int:
+        """Return how many fewer points are `explained` (3, n) aside than here, the less either way.
+
+        None where that may be chance.
+        """
+        here, *aside = explained
         return min(_fewer(here, there, self._p.chance) for there in aside)
 
     def _grow(self, direction: FloatArray, pace: Pace) -> None:
@@ -281,6 +338,13 @@ class Drift:
         squares = np.maximum(np.einsum("i,kij,j->k", metric, self._covariances, metric), 0.0)
         more = 2 * np.sqrt(squares) / (direction @ metric) * grown + grown**2
         self._covariances = self._covariances + more[:, None, None] * np.outer(direction, direction)
+
+
+def _carried(covariances: FloatArray, way: FloatArray) -> FloatArray:
+    """Return (k, 3, 3) `covariances` of a pose a `way` (2,) farther on, same frame [m]."""
+    moves = np.eye(3)
+    moves[:2, 2] = -way[1], way[0]
+    return np.asarray(moves @ covariances @ moves.T)
 
 
 def _fewer(here: BoolArray, there: BoolArray, sigmas: float) -> int:

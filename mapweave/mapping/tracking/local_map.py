@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.kernels.point_map import make_point_map
 from mapweave.kernels.pose_evidence import (
     EvidenceSettings,
@@ -230,24 +230,19 @@ class LocalMap:
             self._raster = LikelihoodField.of(self._known.content()[0], centre[:2], p)
         return self._raster
 
-    def explained(
-        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
-    ) -> BoolArray:
-        """(k, n) which `points` lie within `reach` [m] of surfaces, at each of `poses` (k, 3).
+    def explained(self, points: OrientedPoints, poses: FloatArray, reach: float) -> BoolArray:
+        """(k, n) which `points` lie within `reach` [m] of surfaces, at each of `poses` (k, 3)."""
+        return self._known.explains(points.points, points.normals, poses, reach)
 
-        Of those that were seen up to point number `until`.
-        """
-        if until >= self.newest:
-            return self._known.explains(points.points, points.normals, poses, reach)
+    def explaining(self, points: OrientedPoints, poses: FloatArray, reach: float) -> IntArray:
+        """(k, n) the numbers of the known points that they lie within `reach` [m] of; or -1."""
         placed = [points.moved(pose) for pose in poses]
-        numbers = [self._known.find(at.points, at.normals, reach)[1] for at in placed]
-        return np.array([(each >= 0) & (each <= until) for each in numbers])
+        return np.array([self._known.find(at.points, at.normals, reach)[1] for at in placed])
 
     def lies_on(self, points: OrientedPoints, pose: FloatArray) -> BoolArray:
         """(n,) which `points`, seen from `pose` (3,), lie on known surfaces."""
         reach = self._parameters.overlap
-        explained = self._known.explains(points.points, points.normals, pose[None], reach)
-        return np.asarray(explained[0])
+        return np.asarray(self.explained(points, pose[None], reach)[0])
 
     def evidence(
         self, scan: Scan, oriented: OrientedPoints, loose: BoolArray, poses: FloatArray

@@ -139,12 +139,15 @@ class MotionModel:
 
         It is more than steps differ by: a robot that stops is wrongly expected again and again.
         Nor is one held still that jitters where hardly anything holds it: what is usual of late is
-        no less uncertain than what was usual with such a turn.
+        no less uncertain than what was usual with such a turn. Of turns that are new to it, its
+        steps with others tell.
         """
         p, alike = self._p, self._alike(turn, self._p.known)
-        if len(alike) < p.enough:
-            return p.max_sigma, self._turn_sigma
         lengths = [math.hypot(x, y) for x, y in alike]
+        if len(alike) < p.enough:
+            lengths = list(reversed(self._lengths))
+        if len(lengths) < p.enough:
+            return p.max_sigma, self._turn_sigma
         return p.unsure * max(median(lengths), median(lengths[: p.steps])), self._turn_sigma
 
     @property

@@ -63,13 +63,7 @@ class Surroundings(Protocol):
     def target(self) -> Target:
         """It, to be aligned to."""
 
-    @property
-    def newest(self) -> int:
-        """The number of its newest point."""
-
-    def explained(
-        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
-    ) -> BoolArray:
+    def explained(self, points: OrientedPoints, poses: FloatArray, reach: float) -> BoolArray:
         """(k, n) which points lie within `reach` [m] of its surfaces at each of `poses` (k, 3)."""
 
 
@@ -155,7 +149,7 @@ class SweepJudge:
         points = set_right(seen.oriented, seen.scan.angles, velocity, sweep)
         thinned = points.at(slice(None, None, 1 + (len(points) - 1) // p.max_points))
         found = align(thinned, known.target, pose, p.icp, self._prior).pose
-        return float(known.explained(points, found[None], p.reach, known.newest).mean())
+        return float(known.explained(points, found[None], p.reach).mean())
 
     def _conclude(self, once: float) -> None:
         """Believe that the mirror spins, or that it does not, once turns tell; or ask no more."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.mapping.mapper import Mapper
 from mapweave.mapping.tracking.drift import Drift, DriftParameters, Pace
 from mapweave.maps import RobotMap
@@ -22,19 +22,27 @@ LONG: FloatArray = np.diag([0.0, 60.0, 500.0])  # a wall along x
 
 
 class Endless:
-    """A wall along x, of which the first points end at x = `end` [m] and at -`end`."""
+    """A wall along x, that ends at x = `end` [m] and at -`end`; what is newer goes on or not.
 
-    def __init__(self, newest: int, end: float, *, known_end: bool = False) -> None:
-        self.newest, self._end, self._known_end = newest, end, known_end
+    Attributes
+    ----------
+    newest, old
+        The number of its newest point, and of those up to its end.
+    """
 
-    def explained(
-        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
-    ) -> BoolArray:
-        """See `Surroundings`: what is newer goes on for ever, or ends there as well."""
+    def __init__(self, newest: int, end: float, *, known_end: bool = False, old: int = 9) -> None:
+        self.newest, self._old, self._end, self._known_end = newest, old, end, known_end
+
+    def explaining(self, points: OrientedPoints, poses: FloatArray, reach: float) -> IntArray:
+        """See `Surroundings`."""
         assert reach < 1.0
         x = points.points[:, 0] + poses[:, :1]
-        ends = self._known_end or until < self.newest
-        return np.abs(x) < self._end if ends else np.ones_like(x, dtype=np.bool_)
+        beyond = -1 if self._known_end else self.newest
+        return np.where(np.abs(x) < self._end, self._old, beyond)
+
+    def explained(self, points: OrientedPoints, poses: FloatArray, reach: float) -> BoolArray:
+        """See `Surroundings`."""
+        return self.explaining(points, poses, reach) >= 0
 
 
 class Noisy:
@@ -45,16 +53,17 @@ class Noisy:
     def __init__(self, lost: int, gained: int) -> None:
         self._lost, self._gained = lost, gained
 
-    def explained(
-        self, points: OrientedPoints, poses: FloatArray, reach: float, until: int
-    ) -> BoolArray:
+    def explained(self, points: OrientedPoints, poses: FloatArray, reach: float) -> BoolArray:
         """See `Surroundings`."""
         assert reach < 1.0
-        assert until <= self.newest
         explained = np.ones((len(poses), len(points)), dtype=np.bool_)
         explained[0, : self._gained] = False
         explained[1:, self._gained : self._gained + self._lost] = False
         return explained
+
+    def explaining(self, points: OrientedPoints, poses: FloatArray, reach: float) -> IntArray:
+        """See `Surroundings`."""
+        return np.where(self.explained(points, poses, reach), self.newest, -1)
 
 
 def told(robot_map: RobotMap) -> FloatArray:
@@ -110,6 +119,26 @@ def test_it_is_over_when_what_was_mapped_before_holds_the_robot_again() -> None:
         drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, known, usual)
         assert drift.covariance.any()
     drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, Endless(20, 2.0, known_end=True), usual)
+    assert not drift.covariance.any()
+
+
+def test_what_was_mapped_when_less_had_drifted_says_where_the_robot_is_as_well_as_then() -> None:
+    drift = drifted(20, Endless(9, 99.0))
+    for newest in (30, 60):
+        for _ in range(20):
+            drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(newest, 99.0), PACE)
+    before = drift.covariance[0, 0] ** 0.5
+    assert before == pytest.approx(60 * PACE.way, rel=0.05)
+    doorway = Endless(60, 2.0, known_end=True, old=30)
+    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, doorway, PACE)
+    assert drift.covariance[0, 0] ** 0.5 == pytest.approx(20 * PACE.way, rel=0.05)
+
+
+def test_of_a_lidar_of_few_beams_few_points_hold_it() -> None:
+    """Three of forty, as twelve of 160."""
+    few, drift = WALL.at(slice(None, None, 2)), Drift(DriftParameters())
+    for _ in range(10):
+        drift.follow(np.zeros(2), np.zeros(3), LONG, few, Noisy(3, 0), PACE)
     assert not drift.covariance.any()
 
 

@@ -76,6 +76,12 @@ def test_a_robot_that_seems_to_stand_since_a_moment_is_not_known_better() -> Non
     assert motion_model.unknown(0.35)[0] < 0.05
 
 
+def test_with_a_turn_that_is_new_to_it_a_robot_goes_no_farther_than_with_others() -> None:
+    """Turning on the spot in a bare corridor is no way of half a metre a scan."""
+    assert paced().unknown(0.07)[0] == 0.5
+    assert paced(*[STRAIGHT * 0.1] * 30).unknown(0.07)[0] == pytest.approx(0.025)
+
+
 @pytest.mark.parametrize("missed", [1, 3])
 def test_while_scans_are_missed_a_robot_goes_on_or_stops(missed: int) -> None:
     motion_model = paced(*[np.array([0.5, 0.0, 0.0])] * 12)
