@@ -126,11 +126,11 @@ def test_what_was_mapped_when_less_had_drifted_says_where_the_robot_is_as_well_a
     drift = drifted(20, Endless(9, 99.0))
     for newest in (30, 60):
         for _ in range(20):
-            drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(newest, 99.0), PACE)
+            drift.follow(np.zeros(2), np.zeros(3), LONG, WALL, Endless(newest, 99.0), usual)
     before = drift.covariance[0, 0] ** 0.5
     assert before == pytest.approx(60 * PACE.way, rel=0.05)
     doorway = Endless(60, 2.0, known_end=True, old=30)
-    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, doorway, PACE)
+    drift.follow(np.zeros(2), np.zeros(3), HELD, WALL, doorway, usual)
     assert drift.covariance[0, 0] ** 0.5 == pytest.approx(20 * PACE.way, rel=0.05)
 
 
@@ -138,7 +138,7 @@ def test_of_a_lidar_of_few_beams_few_points_hold_it() -> None:
     """Three of forty, as twelve of 160."""
     few, drift = WALL.at(slice(None, None, 2)), Drift(DriftParameters())
     for _ in range(10):
-        drift.follow(np.zeros(2), np.zeros(3), LONG, few, Noisy(3, 0), PACE)
+        drift.follow(np.zeros(2), np.zeros(3), LONG, few, Noisy(3, 0), usual)
     assert not drift.covariance.any()
 
 
