@@ -85,8 +85,8 @@ def test_of_points_that_are_as_near_the_first_one_is_found(seed: int, size: int)
     rng = np.random.default_rng(seed)
     known, ahead = both(blocks=3)[0], np.tile([0.0, 1.0], (size, 1))
     for _ in range(5):  # on a lattice, some on one spot; the first blocks are forgotten
-        known.add(0.25 * rng.integers(0, 5, (size, 2)), ahead)
-    places, asked = known.content()[0], 0.125 * rng.integers(-1, 10, (size, 2))
+        known.add(rng.integers(0, 5, (size, 2)) / 4, ahead)
+    places, asked = known.content()[0], rng.integers(-1, 10, (size, 2)) / 8
     apart = np.hypot(*(asked[:, None] - places).T).T
     first, least = apart.argmin(axis=1), apart.min(axis=1)
     for reach in (0.125, 0.3, 2.0):
