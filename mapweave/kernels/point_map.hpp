@@ -27,6 +27,74 @@ struct Point {
   int32_t tag;        // polyline, -1 for none
 };
 
+// Four numbers side by side, as wide registers take them.
+typedef double Wide __attribute__((vector_size(32), aligned(8)));
+
+// Four points; where there are fewer, the others are at infinity.
+struct Four {
+  Wide x, y, u, v;
+};
+
+// The two least squared distances to points, and the number of the point that the least is to.
+struct LeastTwo {
+  double least, second;
+  size_t number;
+};
+
+// Of so many fours; where both are equal, the number is that of any of these points.
+MAPWEAVE_WIDE inline LeastTwo least_two(const Four* fours, size_t count, double x, double y, double u, double v) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  Wide least = {kFar, kFar, kFar, kFar}, second = least, place = {0, 0, 0, 0};
+  for (size_t k = 0; k < count; ++k) {
+    const Four& four = fours[k];
+    const Wide dx = four.x - x, dy = four.y - y, du = four.u - u, dv = four.v - v;
+    const Wide d = dx * dx + dy * dy + (du * du + dv * dv);
+    const auto nearer = d < least;
+    const Wide farther = nearer ? least : d;
+    second = farther < second ? farther : second;
+    place = nearer ? Wide{} + static_cast<double>(k) : place;
+    least = nearer ? d : least;
+  }
+  int best = 0;
+  for (int e = 1; e < 4; ++e)
+    if (least[e] < least[best]) best = e;
+  double other = second[best];
+  for (int e = 0; e < 4; ++e)
+    if (e != best) other = std::min(other, least[e]);
+  return {least[best], other, 4 * static_cast<size_t>(place[best]) + static_cast<size_t>(best)};
+}
+
+// The points of a cell of the grid, and the same by fours.
+struct Cell {
+  std::vector<Point> points;
+  std::vector<Four> fours;
+
+  LeastTwo least_two(double x, double y, double u, double v) const {
+    return point_map::least_two(fours.data(), fours.size(), x, y, u, v);
+  }
+
+  void add(const Point& point) {
+    points.push_back(point);
+    lay_out(points.size() - 1);
+  }
+
+  void remove(int64_t number) {
+    const auto gone = std::find_if(points.begin(), points.end(), [&](const Point& p) { return p.number == number; });
+    lay_out(static_cast<size_t>(points.erase(gone) - points.begin()));
+  }
+
+ private:
+  // Lays the points from one on out anew.
+  void lay_out(size_t first) {
+    fours.resize((points.size() + 3) / 4);
+    for (size_t k = first; k < 4 * fours.size(); ++k) {
+      Four& four = fours[k / 4];
+      const Point point = k < points.size() ? points[k] : Point{std::numeric_limits<double>::infinity()};  // or none
+      four.x[k % 4] = point.x, four.y[k % 4] = point.y, four.u[k % 4] = point.u, four.v[k % 4] = point.v;
+    }
+  }
+};
+
 struct Known {
   double x, y, nx, ny;
   int64_t seen;  // block in which it was seen last; -1 once it is forgotten
@@ -132,9 +200,9 @@ class PointMap {
     for (Point& point : fresh) {  // afterwards: a block's own points do not thin each other
       point.number = first_ + static_cast<int64_t>(known_.size());
       reach_out(point.x, point.y);
-      std::vector<Point>& here = cells_[cell_of(point.x, point.y)];
-      if (here.empty()) tell_around(index(point.x) - left_, index(point.y) - low_);
-      here.push_back(point);
+      Cell& here = cells_[cell_of(point.x, point.y)];
+      if (here.points.empty()) tell_around(index(point.x) - left_, index(point.y) - low_);
+      here.add(point);
       known_.push_back({point.x, point.y, point.nx, point.ny, block_});
       seen_in_.back().push_back(point.number);
       sample(point.number);
@@ -279,7 +347,7 @@ class PointMap {
   std::deque<Known> known_;                             // by number, from first_ on
   std::deque<std::vector<int64_t>> seen_in_ = {{}};     // numbers seen in each of the last blocks
   int64_t left_ = 0, low_ = 0, columns_ = 0, rows_ = 0;  // the cells there are
-  std::vector<std::vector<Point>> cells_;
+  std::vector<Cell> cells_;
   std::vector<uint8_t> empty_;  // rings about each cell, itself the first, that hold no point for sure
   mutable std::vector<Known> sampled_;  // of the points that are there, those with a multiple of `every_`, if it is set
   mutable std::vector<int64_t> numbers_;  // of these
@@ -365,7 +433,7 @@ class PointMap {
 
   void lay_out(int64_t left, int64_t low, int64_t columns, int64_t rows) {
     if (columns > kMaxCells / rows) throw std::invalid_argument("points: spread over too wide an area");
-    std::vector<std::vector<Point>> cells(static_cast<size_t>(columns * rows));
+    std::vector<Cell> cells(static_cast<size_t>(columns * rows));
     for (int64_t i = 0; i < columns_; ++i)
       for (int64_t j = 0; j < rows_; ++j) {
         const int64_t a = i + left_ - left, b = j + low_ - low;
@@ -377,7 +445,7 @@ class PointMap {
     empty_.assign(cells_.size(), static_cast<uint8_t>(kRings + 1));
     for (int64_t i = 0; i < columns_; ++i)
       for (int64_t j = 0; j < rows_; ++j)
-        if (!cells_[i * rows_ + j].empty()) tell_around(i, j);
+        if (!cells_[i * rows_ + j].points.empty()) tell_around(i, j);
   }
 
   void renew(int64_t number) {
@@ -397,8 +465,7 @@ class PointMap {
       if (known.seen != oldest) continue;
       known.seen = -1;
       gone.push_back(number);
-      auto& here = cells_[cell_of(known.x, known.y)];
-      here.erase(std::find_if(here.begin(), here.end(), [&](const Point& p) { return p.number == number; }));
+      cells_[cell_of(known.x, known.y)].remove(number);
       --count_;
     }
     sample_less(gone);
@@ -411,7 +478,7 @@ class PointMap {
     int64_t first = columns_, last = -1, lowest = rows_, highest = -1;
     for (int64_t i = 0; i < columns_; ++i)
       for (int64_t j = 0; j < rows_; ++j) {
-        if (cells_[i * rows_ + j].empty()) continue;
+        if (cells_[i * rows_ + j].points.empty()) continue;
         first = std::min(first, i), last = std::max(last, i);
         lowest = std::min(lowest, j), highest = std::max(highest, j);
       }
@@ -420,18 +487,21 @@ class PointMap {
     if (columns * rows * 2 < columns_ * rows_) lay_out(left_ + first - kMargin, low_ + lowest - kMargin, columns, rows);
   }
 
-  // Calls `visit` with each cell of the ring of cells `r` away from (i, j), and the number of its column and row.
+  // Calls `visit` with each cell of the ring of cells `r` away from (i, j) that may hold a point, and the number of
+  // its column and row.
   template <typename Visit>
   void ring(int64_t i, int64_t j, int64_t r, Visit&& visit) const {
     const int64_t a0 = std::max(i - r, left_), a1 = std::min(i + r, left_ + columns_ - 1);
     const int64_t b0 = std::max(j - r, low_), b1 = std::min(j + r, low_ + rows_ - 1);
     for (int64_t a = a0; a <= a1; ++a) {
-      const std::vector<Point>* column = cells_.data() + (a - left_) * rows_ - low_;
+      const Cell* column = cells_.data() + (a - left_) * rows_ - low_;
+      const uint8_t* empty = empty_.data() + (a - left_) * rows_ - low_;
       if (a == i - r || a == i + r) {
-        for (int64_t b = b0; b <= b1; ++b) visit(column[b], a, b);
+        for (int64_t b = b0; b <= b1; b += std::max<int64_t>(1, empty[b]))
+          if (!empty[b]) visit(column[b], a, b);
       } else {
-        if (j - r >= low_ && j - r < low_ + rows_) visit(column[j - r], a, j - r);
-        if (r > 0 && j + r >= low_ && j + r < low_ + rows_) visit(column[j + r], a, j + r);
+        if (j - r >= low_ && j - r < low_ + rows_ && !empty[j - r]) visit(column[j - r], a, j - r);
+        if (r > 0 && j + r >= low_ && j + r < low_ + rows_ && !empty[j + r]) visit(column[j + r], a, j + r);
       }
     }
   }
@@ -456,6 +526,12 @@ class PointMap {
       const double d = squared(*guess, x, y, u, v);
       if (d < best) best = d, found = guess;
     }
+    // Whether a point is nearer than the nearest so far, or as near and was added before it.
+    const auto compare = [&](const Point& q, double d) {
+      if (&q == found) return;
+      next = std::min(next, std::max(d, best));
+      if (d < best || (d == best && found && q.number < found->number)) best = d, found = &q;
+    };
     const int64_t farthest = std::max(std::max(i - left_, left_ + columns_ - 1 - i),
                                       std::max(j - low_, low_ + rows_ - 1 - j));
     for (int64_t r = empty_rings(i, j); r <= farthest; ++r) {
@@ -464,27 +540,20 @@ class PointMap {
         next = std::min(next, gap * gap);
         break;
       }
-      ring(i, j, r, [&](const std::vector<Point>& here, int64_t a, int64_t b) {
-        if (here.empty()) return;
+      ring(i, j, r, [&](const Cell& here, int64_t a, int64_t b) {
         const double gap_x = gap_to(x, a), gap_y = gap_to(y, b), nearest_here = gap_x * gap_x + gap_y * gap_y;
         if (nearest_here > best) {
           next = std::min(next, nearest_here);
           return;
         }
-        // No branches but for equals: which point is nearer than those before is a toss.
-        for (const Point& q : here) {
-          const double d = squared(q, x, y, u, v);
-          if (d == best) {
-            if (&q == found) continue;
-            next = best;
-            if (found && q.number < found->number) found = &q;
-            continue;
-          }
-          const bool nearer = d < best;
-          const double other = nearer ? best : d;
-          next = other < next ? other : next;
-          best = nearer ? d : best;
-          found = nearer ? &q : found;
+        const LeastTwo two = here.least_two(x, y, u, v);
+        if (two.least > best) {
+          next = std::min(next, two.least);
+        } else if (two.second == two.least) {
+          for (const Point& q : here.points) compare(q, squared(q, x, y, u, v));
+        } else {
+          compare(here.points[two.number], two.least);
+          next = std::min(next, two.second);
         }
       });
     }
@@ -509,8 +578,7 @@ class PointMap {
     const int64_t j0 = std::max(index(y - wide), low_), j1 = std::min(index(y + wide), low_ + rows_ - 1);
     for (int64_t i = i0; i <= i1; ++i)
       for (int64_t j = j0; j <= j1; ++j)
-        for (const Point& q : cells_[(i - left_) * rows_ + (j - low_)])
-          if (squared(q, x, y, u, v) < limit) return true;
+        if (cells_[(i - left_) * rows_ + (j - low_)].least_two(x, y, u, v).least < limit) return true;
     return false;
   }
 

@@ -78,6 +78,23 @@ def test_maps_that_took_the_same_blocks_hold_and_find_the_same(
     )
 
 
+@pytest.mark.skipif(COMPILED is None, reason="twins take any of them")
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.integers(1, 60))
+def test_of_points_that_are_as_near_the_first_one_is_found(seed: int, size: int) -> None:
+    rng = np.random.default_rng(seed)
+    known, ahead = both(blocks=3)[0], np.tile([0.0, 1.0], (size, 1))
+    for _ in range(5):  # on a lattice, some on one spot; the first blocks are forgotten
+        known.add(rng.integers(0, 5, (size, 2)) / 4, ahead)
+    places, asked = known.content()[0], rng.integers(-1, 10, (size, 2)) / 8
+    apart = np.hypot(*(asked[:, None] - places).T).T
+    first, least = apart.argmin(axis=1), apart.min(axis=1)
+    for reach in (0.125, 0.3, 2.0):
+        number = known.find(asked, ahead, reach)[1]
+        expected = np.where(least < reach, known.newest - len(places) + 1 + first, -1)
+        np.testing.assert_array_equal(number, expected)
+
+
 @settings(max_examples=25, deadline=None)
 @given(seeds, st.booleans())
 def test_alignments_end_at_the_same_poses(seed: int, tagged: bool) -> None:
