@@ -16,7 +16,7 @@ def chosen(
     candidates: FloatArray, seen: FloatArray, counts: list[int], price: float = 0.5
 ) -> list[int]:
     evidence = Sightings.of(seen, np.array(counts), 0.1)
-    return selected(candidates, evidence, price).tolist()
+    return [int(k) for k in selected(candidates, evidence, price)]
 
 
 def selected(candidates: FloatArray, evidence: Sightings, price: float) -> IntArray:
