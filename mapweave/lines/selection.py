@@ -46,17 +46,25 @@ class SelectionParameters(StageParameters):
     )
 
 
+def bearing(
+    candidates: FloatArray, evidence: Sightings, parameters: SelectionParameters
+) -> Nearness:
+    """Pair (n, 4) `candidates` [m] with the evidence that each of them explains or denies."""
+    reach = max(parameters.tolerance, parameters.shadow)
+    return Nearness.of(candidates, evidence.points, evidence.directions, reach)
+
+
 def select(
-    candidates: FloatArray, evidence: Sightings, price: float, parameters: SelectionParameters
+    count: int, near: Nearness, evidence: Sightings, price: float, parameters: SelectionParameters
 ) -> IntArray:
-    """Return which candidates to keep, the one that explains most first.
+    """Return which of `count` candidates to keep, the one that explains most first.
 
     Parameters
     ----------
-    candidates
-        (n, 4) x1 y1 x2 y2 [m], the visible side on the left.
+    near
+        What bears on each candidate, as of `bearing`.
     evidence
-        What was seen, the same frame.
+        What was seen.
     price
         The weight of evidence [m] below which none is kept.
     parameters
@@ -67,17 +75,11 @@ def select(
     IntArray
         (k,) indices of candidates, in the order in which they were chosen.
     """
-    near = Nearness.of(
-        candidates,
-        evidence.points,
-        evidence.directions,
-        max(parameters.tolerance, parameters.shadow),
-    )
     explains = explained(near, parameters)
     # What a segment denies, being close in front of or behind it, counts against it.
     settled = explains | shadowed(near, parameters)
     return take_greedily(
-        len(candidates),
+        count,
         near.segment[settled],
         near.sample[settled],
         explains[settled],

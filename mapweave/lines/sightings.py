@@ -104,3 +104,29 @@ class Nearness:
             [m] from a segment at most.
         """
         return cls(*near_pairs(segments, points, directions, reach))
+
+    def of_segments(self, chosen: IntArray) -> "Nearness":
+        """Return the pairs of the (n,) `chosen` segments, which are numbered in that order."""
+        first, last = (np.searchsorted(self.segment, chosen, side) for side in ("left", "right"))
+        counts = last - first
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        pairs = np.repeat(first, counts) + within
+        return Nearness(
+            np.repeat(np.arange(len(chosen)), counts),
+            self.sample[pairs],
+            self.along[pairs],
+            self.across[pairs],
+            self.distance[pairs],
+            self.cosine[pairs],
+        )
+
+    def followed_by(self, others: "Nearness", count: int) -> "Nearness":
+        """Return these pairs, of `count` segments, and those of others that are numbered on."""
+        return Nearness(
+            np.concatenate([self.segment, others.segment + count]),
+            np.concatenate([self.sample, others.sample]),
+            np.concatenate([self.along, others.along]),
+            np.concatenate([self.across, others.across]),
+            np.concatenate([self.distance, others.distance]),
+            np.concatenate([self.cosine, others.cosine]),
+        )

@@ -16,7 +16,7 @@ from mapweave.lines.corner_junctions import JoiningParameters, join_corners
 from mapweave.lines.directions import main_directions
 from mapweave.lines.fitting import FittingParameters, cut, fit, follow, trim
 from mapweave.lines.merging import MergingParameters, evolve
-from mapweave.lines.selection import SelectionParameters, explained, select, shadowed
+from mapweave.lines.selection import SelectionParameters, bearing, explained, select, shadowed
 from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.lines.t_junctions import WallEndParameters, meet_walls
 from mapweave.parameters import StageParameters, derived
@@ -75,13 +75,17 @@ def simplify(
     _, lengths = units(sightings)
     directions = main_directions(sightings, lengths * counts, p.merging.directions)
     candidates = _placed(merged, evidence, directions, free, p)
-    chosen = candidates[select(candidates, evidence, price, p.selection)]
-    missed = _missed(chosen, sightings, p)
+    near = bearing(candidates, evidence, p.selection)
+    chosen = select(len(candidates), near, evidence, price, p.selection)
+    missed = _missed(candidates[chosen], sightings, p)
     if missed.any():
         again = _proposed_again(sightings[missed], counts[missed], p)
-        candidates = np.concatenate([candidates, _placed(again, evidence, directions, free, p)])
-        chosen = candidates[select(candidates, evidence, price, p.selection)]
-    walls = straighten(_trimmed(chosen, evidence, p), free, p.straightening)
+        others = _placed(again, evidence, directions, free, p)
+        near = near.followed_by(bearing(others, evidence, p.selection), len(candidates))
+        candidates = np.concatenate([candidates, others])
+        chosen = select(len(candidates), near, evidence, price, p.selection)
+    trimmed = _trimmed(candidates[chosen], near.of_segments(chosen), evidence, p)
+    walls = straighten(trimmed, free, p.straightening)
     return meet_walls(join_corners(walls, free, p.joining), free, p.wall_ends)
 
 
@@ -147,10 +151,11 @@ def _missed(chosen: FloatArray, sightings: FloatArray, p: SimplificationParamete
     return np.asarray(share < p.missed * total)
 
 
-def _trimmed(chosen: FloatArray, evidence: Sightings, p: SimplificationParameters) -> FloatArray:
-    """Return the `chosen` without what an earlier one stands for already."""
-    near = Nearness.of(chosen, evidence.points, evidence.directions, p.selection.shadow)
-    explains = explained(near, p.selection)
+def _trimmed(
+    chosen: FloatArray, near: Nearness, evidence: Sightings, p: SimplificationParameters
+) -> FloatArray:
+    """Return the `chosen`, `near` which that evidence is, without what earlier ones stand for."""
+    explains = explained(near, p.selection) & (near.distance <= p.selection.shadow)
     settles = explains | shadowed(near, p.selection)
     trimmed = trim(chosen, near, explains, settles, evidence)
     return trimmed[_is_long(trimmed, p)]

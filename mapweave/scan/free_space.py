@@ -9,10 +9,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.geometry import LinearRing, MultiLineString, MultiPolygon, Polygon, box
+from shapely.geometry import LinearRing, MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
+from mapweave.geometry.polygons import edges_of
 from mapweave.kernels.clearing import (
     Floats32,
     Grid,
@@ -21,6 +22,7 @@ from mapweave.kernels.clearing import (
     from_core,
     outlines,
 )
+from mapweave.kernels.lines.evidence import near_pairs
 from mapweave.kernels.matching.rasters import filled_cells
 from mapweave.parameters import StageParameters, derived
 
@@ -213,10 +215,10 @@ def _begun_far_out(area: BaseGeometry) -> BaseGeometry:
 
 def _follows(simpler: BaseGeometry, area: BaseGeometry, tolerance: float) -> bool:
     """Whether each corner of `area` has an outline of `simpler` within `tolerance`."""
-    edges = MultiLineString(list(shapely.get_rings(shapely.get_parts(simpler))))
-    shapely.prepare(edges)
-    corners = shapely.points(shapely.get_coordinates(shapely.get_rings(shapely.get_parts(area))))
-    return bool(shapely.dwithin(edges, corners, tolerance * (1 + ROUNDING)).all())
+    corners = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(area)))
+    nothing, reach = np.zeros(corners.shape), tolerance * (1 + ROUNDING)
+    _, near, *_ = near_pairs(edges_of(simpler), corners, nothing, reach)
+    return len(np.unique(near)) == len(corners)
 
 
 def rings(free_space: BaseGeometry) -> tuple[FloatArray, ...]:

@@ -8,6 +8,8 @@ named. The poses are fitted to those that are right.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import Field
@@ -32,6 +34,10 @@ from mapweave.team.cycles import Edge, misfit, poses_along
 from mapweave.team.inliers import component_confidence, part_right, rely, weakest_link
 from mapweave.team.min_cut import groups
 from mapweave.team.orders.bans import Ban, Bans
+from mapweave.team.recent import Recent
+
+# By the alignment, the numbers of its components, and the frames at their middles.
+KnownEdges: TypeAlias = Recent[tuple[Alignment, int, int, bytes, bytes], Edge]
 
 
 class AlignmentGraphParameters(StageParameters):
@@ -67,6 +73,7 @@ def cluster_components(
     rasters: Mapping[str, DistanceField] | None = None,
     verdicts: KnownVerdicts | None = None,
     bans: Sequence[Ban] = (),
+    edges: KnownEdges | None = None,
 ) -> tuple[list[Cluster], tuple[Alignment, ...]]:
     """Return the clusters, largest first, and `alignments` with those set aside made ambiguous.
 
@@ -84,10 +91,12 @@ def cluster_components(
         Of maps about each other, those of versions before among them.
     bans
         What operators forbid, between the numbers of `names` and at the maps' middles.
+    edges
+        What alignments are in the graph, those of versions before among them.
     """
     known = set(names)
     alignments = [a for a in alignments if a.reference in known and a.other in known]
-    graph = _Graph(names, alignments, parameters, rasters or {}, verdicts, bans)
+    graph = _Graph(names, alignments, parameters, rasters or {}, verdicts, bans, edges)
     judged = tuple(graph.judge(alignment) for alignment in alignments)
     return sorted(graph.clusters(), key=lambda c: -len(c.poses)), judged
 
@@ -103,6 +112,7 @@ class _Graph:
         rasters: Mapping[str, DistanceField],
         verdicts: KnownVerdicts | None,
         bans: Sequence[Ban],
+        known: KnownEdges | None,
     ) -> None:
         self._names, self._parameters = names, parameters
         self._number = {name: number for number, name in enumerate(names)}
@@ -111,7 +121,7 @@ class _Graph:
         # In an order of their own, so that the order in which they came changes nothing.
         links.sort(key=lambda a: (-a.confidence, a.reference, a.other, *a.transform))
         self._edge_of = {id(link): k for k, link in enumerate(links)}
-        self._edges = [self._edge(link) for link in links]
+        self._edges = self._made_of(links, Recent() if known is None else known)
         self._rigid = [_rigid(link) for link in links]
         seen = {self._number[name]: raster for name, raster in rasters.items()}
         witnesses = PairVerdicts(seen, self._middles, parameters.contradictions, verdicts)
@@ -121,8 +131,16 @@ class _Graph:
         self._explanations = explain(len(names), self._edges, p, self._doubts, self._bans)
         self._right = rely(len(names), self._edges, self._explanations)
 
-    def _edge(self, link: Alignment) -> Edge:
-        first, second = self._number[link.reference], self._number[link.other]
+    def _made_of(self, links: Sequence[Alignment], known: KnownEdges) -> list[Edge]:
+        """Return the edge of each of `links`, in their order."""
+        ends = [(self._number[link.reference], self._number[link.other]) for link in links]
+        frames = [frame.tobytes() for frame in self._middles]
+        return [
+            known.get((link, i, j, frames[i], frames[j]), partial(self._edge, link, i, j))
+            for link, (i, j) in zip(links, ends, strict=True)
+        ]
+
+    def _edge(self, link: Alignment, first: int, second: int) -> Edge:
         there = se2.compose(link.transform, self._middles[second])
         # What is asked first is whether the places are right; that maps are bent is no objection.
         bent = bend(link.evidence.reach or 0.0, self._parameters.reach)

@@ -20,7 +20,12 @@ from mapweave.maps import (
 )
 from mapweave.matching.distance_field import DistanceField
 from mapweave.orders import Order
-from mapweave.team.alignment_graph import Cluster, cluster_components, frame_at_middle
+from mapweave.team.alignment_graph import (
+    Cluster,
+    KnownEdges,
+    cluster_components,
+    frame_at_middle,
+)
 from mapweave.team.contradictions import KnownVerdicts
 from mapweave.team.joining import JointParameters, Kept, Piece, join
 from mapweave.team.joint_optimization import JointOptimizationParameters, JointOptimizer
@@ -51,6 +56,7 @@ class JointMapBuilder:
         self._wholes: Recent[tuple[tuple[LineMap, bytes], ...], DistanceField | None] = Recent()
         self._witnesses: Recent[LineMap, Witness | None] = Recent()
         self._verdicts: KnownVerdicts = Recent()
+        self._edges: KnownEdges = Recent()
         self._kept = Kept()
 
     @property
@@ -79,7 +85,7 @@ class JointMapBuilder:
             of many wait for the next version.
         """
         self._weaver.turn(patient=patient)
-        for kept in (self._wholes, self._witnesses, self._verdicts, self._kept):
+        for kept in (self._wholes, self._witnesses, self._verdicts, self._edges, self._kept):
             kept.turn()
         submaps = submaps_by_component(maps)
         found = {name: self._whole(each) for name, each in submaps.items()}
@@ -93,6 +99,7 @@ class JointMapBuilder:
             rasters,
             self._verdicts,
             rulings.bans,
+            self._edges,
         )
         marks = held_marks(maps)
         joined = tuple(self._join(cluster, submaps, judged, marks) for cluster in clusters)

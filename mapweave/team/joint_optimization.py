@@ -193,7 +193,7 @@ class JointOptimizer:
             asked = _Compared(nodes[first].submap.map, nodes[second].submap.map, *about)
             link = self._link(asked)
             if link is not None:
-                yield replace(link, first=first, second=second)
+                yield Constraint(first, second, link.transform, link.covariance, link.trusted)
 
     def _link(self, asked: _Compared) -> Constraint | None:
         """Return what comparing comes to; None where it shows nothing, or has to wait."""

@@ -15,6 +15,7 @@ from mapweave.maps import Alignment, Decision, RobotMap, SharedPlace, parse_comp
 from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave.team.recent import Recent
 from mapweave_protocol.wire.budget import MIB, Budget
+from mapweave_protocol.wire.coding.extensions import Extended, extended
 from mapweave_protocol.wire.model import (
     MAX_ALIGNMENTS,
     ComponentName,
@@ -205,9 +206,9 @@ class WireAlignment(WireModel):
         return self
 
     @cached_property
-    def travelling(self) -> tuple[object, ...]:
+    def travelling(self) -> Extended:
         """What `values` returns: of version after version, most alignments are as they were."""
-        return super().values()
+        return Extended([extended(value) for value in super().values()])
 
     def values(self) -> tuple[object, ...]:
         """Return the values of the fields, in their order, as they travel."""

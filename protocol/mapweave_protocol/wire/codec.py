@@ -7,10 +7,7 @@ decoding gives a valid message or raises `MessageError`, and allocates no more t
 of what came (`budget`).
 """
 
-import re
 import zlib
-from decimal import Decimal
-from functools import lru_cache
 from typing import TypeVar
 
 import msgpack
@@ -19,6 +16,7 @@ from pydantic import ValidationError
 from mapweave.text import in_words
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.wire.budget import MIB, check_objects
+from mapweave_protocol.wire.coding.extensions import extended, unextended
 from mapweave_protocol.wire.dictionary import DICTIONARY
 from mapweave_protocol.wire.model import MAX_ALIGNMENTS, Message
 
@@ -27,10 +25,6 @@ VERSION = 3
 MAX_PAYLOAD = 16 * MIB  # of any kind
 PLAIN, DEFLATED = b"\0", b"\1"
 _HEAD = len(MAGIC) + 3
-_MAX_EXPONENT = 40
-REMEMBERED = 2**14  # numbers, of some 100 bytes
-_BOOT = 100  # the type of an extension that is 8 hexadecimal digits, such as name runs
-_HEXADECIMAL = re.compile(r"[0-9a-f]{8}")
 _EARLIER = (0x83,)  # a msgpack map of three, which versions 1 and 2 began with
 
 M = TypeVar("M", bound=Message)
@@ -44,7 +38,7 @@ def encode(message: Message) -> bytes:
     MessageError
         If it is too large to be sent.
     """
-    body: bytes = msgpack.packb(_extended(message.values()))
+    body: bytes = msgpack.packb(extended(message.values()))
     packer = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=DICTIONARY)
     deflated = packer.compress(body) + packer.flush()
     budget = message.budget
@@ -126,49 +120,13 @@ def _unpack(kind: type[Message], data: bytes, most: int) -> object:
             max_array_len=MAX_ALIGNMENTS,
             max_map_len=MAX_ALIGNMENTS,
             max_ext_len=4,
-            ext_hook=_unextended,
+            ext_hook=unextended,
         )
     # msgpack raises ValueError and its subclasses for all damage, TypeError for unhashable keys.
     except (ValueError, TypeError) as error:
         raise MessageError(
             kind.format, f"not msgpack as expected ({type(error).__name__})"
         ) from error
-
-
-def _extended(value: object) -> object:
-    """Return `value` with floats of few digits as extensions: the exponent, and the digits.
-
-    So is a string of 8 hexadecimal digits.
-    """
-    if isinstance(value, float):  # most of what a message holds
-        return _decimal(value)
-    if isinstance(value, tuple):
-        return tuple([_extended(item) for item in value])
-    if isinstance(value, dict):
-        return {key: _extended(item) for key, item in value.items()}
-    if isinstance(value, str) and _HEXADECIMAL.fullmatch(value):
-        return msgpack.ExtType(_BOOT, bytes.fromhex(value))
-    return value
-
-
-@lru_cache(maxsize=REMEMBERED)  # most numbers of a version were in the one before
-def _decimal(value: float) -> object:
-    sign, digits, exponent = Decimal(repr(value)).as_tuple()
-    if not isinstance(exponent, int) or not -_MAX_EXPONENT <= exponent <= _MAX_EXPONENT:
-        return value
-    number = int("".join(map(str, digits))) * (-1 if sign else 1)
-    size = next((n for n in (1, 2, 4) if -(1 << 8 * n - 1) <= number < 1 << 8 * n - 1), 0)
-    if not size or not number:
-        return value
-    return msgpack.ExtType(exponent + _MAX_EXPONENT, number.to_bytes(size, "little", signed=True))
-
-
-def _unextended(code: int, data: bytes) -> float | str:
-    if code == _BOOT and len(data) == 4:
-        return data.hex()
-    if not 0 <= code <= 2 * _MAX_EXPONENT:
-        raise ValueError("an extension that is no number")
-    return float(f"{int.from_bytes(data, 'little', signed=True)}e{code - _MAX_EXPONENT}")
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -5,7 +5,7 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray, IntArray
-from mapweave.lines.selection import SelectionParameters, explained, select
+from mapweave.lines.selection import SelectionParameters, bearing, explained, select
 from mapweave.lines.sightings import Nearness, Sightings
 from tests.mapweave.buildings import random_pose
 
@@ -16,7 +16,12 @@ def chosen(
     candidates: FloatArray, seen: FloatArray, counts: list[int], price: float = 0.5
 ) -> list[int]:
     evidence = Sightings.of(seen, np.array(counts), 0.1)
-    return [int(k) for k in select(candidates, evidence, price, SelectionParameters())]
+    return [int(k) for k in selected(candidates, evidence, price)]
+
+
+def selected(candidates: FloatArray, evidence: Sightings, price: float) -> IntArray:
+    p = SelectionParameters()
+    return select(len(candidates), bearing(candidates, evidence, p), evidence, price, p)
 
 
 def test_one_wall_that_explains_all_is_taken_before_its_many_pieces() -> None:
@@ -72,7 +77,7 @@ def test_always_the_one_that_explains_most_of_what_is_left_is_next(rng: Generato
     start = rng.uniform(0, 3, (60, 2))
     seen = np.hstack([start, start + rng.normal(0, 0.7, (60, 2))])
     evidence = Sightings.of(seen, rng.integers(1, 9, 60), 0.1)
-    found: IntArray = select(seen, evidence, 0.5, SelectionParameters())
+    found = selected(seen, evidence, 0.5)
     assert 5 < len(found) < 60
     assert found.tolist() == naive(seen, evidence, 0.5)
 

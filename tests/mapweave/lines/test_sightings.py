@@ -1,5 +1,7 @@
 """Evidence: samples that stand for the wall that was seen, and what lies near them."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from numpy.random import Generator
@@ -79,6 +81,18 @@ def test_nearness_agrees_with_every_pair_looked_at_after_any_rigid_motion(rng: G
             assert value == pytest.approx(expected[pair], abs=1e-9)
         np.testing.assert_allclose(near.cosine, own[near.segment, 0], atol=1e-9)
         np.testing.assert_allclose(near.along, along[near.segment, near.sample], atol=1e-9)
+
+
+def test_what_is_near_some_of_many_segments_is_what_is_near_them_alone(rng: Generator) -> None:
+    segments, points = some_segments(rng, 30), rng.uniform(-5, 5, (200, 2))
+    directions = np.tile([1.0, 0.0], (200, 1))
+    first, others = (Nearness.of(s, points, directions, 0.4) for s in np.split(segments, [12]))
+    together = first.followed_by(others, 12)
+    for chosen in (np.arange(30), rng.permutation(30)[:17], np.empty(0, dtype=np.int64)):
+        near = together.of_segments(chosen)
+        alone = Nearness.of(segments[chosen], points, directions, 0.4)
+        for field in fields(Nearness):
+            np.testing.assert_array_equal(getattr(near, field.name), getattr(alone, field.name))
 
 
 def test_nothing_seen_is_no_evidence() -> None:

@@ -16,6 +16,7 @@ from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.assembler import MapAssembler
 from mapweave_protocol.wire import alignment_message
 from mapweave_protocol.wire.codec import DEFLATED, PLAIN, decode, encode
+from mapweave_protocol.wire.coding.extensions import extended
 from mapweave_protocol.wire.joint_status_message import Place
 from mapweave_protocol.wire.messages import (
     AlignmentMessage,
@@ -201,7 +202,7 @@ def test_a_status_arrives_as_it_was_sent() -> None:
 
 def test_what_is_known_by_its_place_travels_without_its_name_and_all_else_with_it() -> None:
     [travels] = alignments().alignments
-    assert travels.values()[5] == (1.5,)  # the first that evidence has is what is in common
+    assert travels.values()[5] == extended((1.5,))  # first in evidence: common
     strange = travels.model_copy(update={"evidence": {"common": 1.5, "strange": 2.0}})
     message = alignments().model_copy(update={"alignments": (strange,)})
     assert decode(AlignmentMessage, encode(message)) == message

@@ -12,6 +12,7 @@ from mapweave.reasons import Reason, ReasonKind, Status, StatusKind
 from mapweave_protocol.wire import geometry
 from mapweave_protocol.wire.alignment_message import AlignmentPacker
 from mapweave_protocol.wire.codec import decode, encode
+from mapweave_protocol.wire.coding.extensions import extended
 from mapweave_protocol.wire.joint_message import JointPacker
 from mapweave_protocol.wire.messages import JointMapMessage
 
@@ -80,8 +81,8 @@ def test_whatever_changes_of_an_alignment_travels(changed: dict[str, object]) ->
 
 def test_a_copy_with_another_value_travels_with_it() -> None:
     [wire] = AlignmentPacker().pack([FIRST])
-    assert wire.values()[4] == 0.9
-    assert wire.model_copy(update={"confidence": 0.5}).values()[4] == 0.5
+    assert wire.values()[4] == extended(0.9)
+    assert wire.model_copy(update={"confidence": 0.5}).values()[4] == extended(0.5)
 
 
 def test_lines_that_stay_are_packed_once_and_what_changes_of_them_anew(
