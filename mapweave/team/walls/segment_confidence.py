@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.parameters import StageParameters, derived
@@ -97,21 +97,11 @@ def segment_confidence(
 
 def _heard(witness: Witness, pose: FloatArray, oriented: OrientedPoints) -> NDArray[np.uint8]:
     """Return (n,) what a piece at `pose` says of each sample."""
-    about = _about(witness, pose, oriented.points)
-    points = se2.transform_points(se2.inverse(pose), oriented.points[about])
+    points = se2.transform_points(se2.inverse(pose), oriented.points)
     index = (points - witness.origin) / witness.cell
     rows, columns = witness.said.shape
     i, j = index[:, 0], index[:, 1]
     inside = np.flatnonzero((i >= 0) & (j >= 0) & (i < rows) & (j < columns))
     heard = np.full(len(oriented), SILENT, dtype=np.uint8)
-    heard[about[inside]] = witness.said[i[inside].astype(np.int64), j[inside].astype(np.int64)]
+    heard[inside] = witness.said[i[inside].astype(np.int64), j[inside].astype(np.int64)]
     return heard
-
-
-def _about(witness: Witness, pose: FloatArray, points: FloatArray) -> IntArray:
-    """Return which (n, 2) points [m] may be in a piece at `pose`: those of a square about it."""
-    sides = witness.cell * np.array(witness.said.shape)
-    x, y = se2.transform_points(pose, witness.origin + sides / 2)
-    # A cell more, against rounding: who is in it is told after.
-    reach = np.hypot(*sides) / 2 + witness.cell
-    return np.flatnonzero((abs(points[:, 0] - x) <= reach) & (abs(points[:, 1] - y) <= reach))
