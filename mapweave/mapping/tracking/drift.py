@@ -252,14 +252,16 @@ class Drift:
     def _return(self, pose: FloatArray, seen: OrientedPoints, known: Surroundings) -> None:
         """Take back what has drifted along directions in which older surfaces hold `seen` again.
 
-        It is known where the robot is as surely as it was when these were seen first.
+        It is known where the robot is as surely as it was when these were seen first. A scan among
+        others that are open may be held by chance: what was mapped before all drift holds it alone.
         """
         steady = not any(self._lately)
         for direction, sigma in self._axes():
             if steady and sigma < self._p.forgotten:
                 self._replace(direction, np.zeros((2, 3, 3)))
                 continue
-            then = self._then(direction, sigma, pose, seen, known)
+            most = sigma - self._p.forgotten if steady else 0.0
+            then = self._then(direction, most, pose, seen, known)
             if then is not None:
                 self._replace(direction, then)
 
@@ -272,7 +274,7 @@ class Drift:
     def _then(
         self,
         direction: FloatArray,
-        sigma: float,
+        at_most: float,
         pose: FloatArray,
         seen: OrientedPoints,
         known: Surroundings,
@@ -280,7 +282,7 @@ class Drift:
         """Return the covariances (2, 3, 3) when what holds it along a `direction` (3,) was mapped.
 
         That is most of what explains the scan, and does so there alone, as all that is known does.
-        None where nothing holds it, or the same had drifted then: a `sigma` [m] at the lever.
+        None where nothing holds it, or more had drifted then than `at_most` [m] at the lever.
         """
         number = known.explaining(seen, self._aside(direction, pose, seen), self._p.reach)
         on_any = number >= 0
@@ -292,7 +294,7 @@ class Drift:
         mapped = np.searchsorted([each.newest for each in self._mapped], number)
         at = np.where(on_any, drifted[np.minimum(mapped, len(drifted) - 1)], np.inf)
         most = np.sort(at[0, on_any[0]])[np.count_nonzero(on_any[0]) // 2]
-        if most > sigma - self._p.forgotten:
+        if most > at_most:
             return None
         enough = max(self._enough(seen), self._p.returned * len(seen))
         if min(self._missing(at <= most), self._missing(on_any)) < enough:

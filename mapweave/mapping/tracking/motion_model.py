@@ -139,15 +139,15 @@ class MotionModel:
 
         It is more than steps differ by: a robot that stops is wrongly expected again and again.
         Nor is one held still that jitters where hardly anything holds it: what is usual of late is
-        no less uncertain than what was usual with such a turn. Of turns that are new to it, its
-        steps with others tell.
+        no less uncertain than what was usual with such a turn. With a turn that is new to it, it
+        goes no farther than with any other.
         """
         p, alike = self._p, self._alike(turn, self._p.known)
-        lengths = [math.hypot(x, y) for x, y in alike]
         if len(alike) < p.enough:
-            lengths = list(reversed(self._lengths))
-        if len(lengths) < p.enough:
-            return p.max_sigma, self._turn_sigma
+            known = len(self._lengths) >= p.enough
+            way = p.unsure * max(self._lengths) if known else p.max_sigma
+            return way, self._turn_sigma
+        lengths = [math.hypot(x, y) for x, y in alike]
         return p.unsure * max(median(lengths), median(lengths[: p.steps])), self._turn_sigma
 
     @property
