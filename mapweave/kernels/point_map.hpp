@@ -27,7 +27,7 @@ struct Point {
   int32_t tag;        // polyline, -1 for none
 };
 
-// Four numbers side by side, as wide registers take them.
+// Four numbers side by side, as wide registers take them; aligned as its numbers are, wherever fours are held.
 typedef double Wide __attribute__((vector_size(32), aligned(8)));
 
 // Four points; where there are fewer, the others are at infinity.
