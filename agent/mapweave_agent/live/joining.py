@@ -23,8 +23,10 @@ def connecting(
 
     Parameters
     ----------
+    endpoints, link
+        As of `open_session`.
     on_wait
-        As of `open_session`; called in whatever thread.
+        The same, told each reason once; called in whatever thread.
 
     Raises
     ------

@@ -74,7 +74,10 @@ class DriftParameters(StageParameters):
     )
     lever: float = Field(3.0, gt=0, description="[m] at which a turn moves what is seen")
     mapped: int = Field(
-        60, ge=1, description="times that surfaces were added, of which it is known how surely"
+        60,
+        ge=1,
+        description="times that surfaces were added, of which it is known how surely: as many as"
+        " keyframes are remembered",
     )
     forgotten: float = derived(
         lambda c: 0.2 * c.mapping.closeness, gt=0, description="[m] of drift that is none"
