@@ -88,8 +88,8 @@ def check_walls_and_cells(cells: GridCells) -> None:
     found = map_of_grid(here, "g").lines(0).segments
     laser = VirtualLaser(here, VirtualScanParameters())
     assert list(laser.scans())
-    off = scipy.spatial.KDTree(middles(cells.wall)).query(along(found))[0]
-    assert off.max() < A_CELL
+    off, _ = scipy.spatial.KDTree(middles(cells.wall)).query(along(found))
+    assert np.max(off) < A_CELL
     left = laser.seen.copy()
     left[left] = distance(middles(left), found) > A_CELL
     runs, _ = scipy.ndimage.label(left, np.ones((3, 3)))
