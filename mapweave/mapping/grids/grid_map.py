@@ -5,9 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from mapweave.config import Config, Sensor
+from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.lines.merging import count_support
+from mapweave.lines.polylines import group_polylines
+from mapweave.lines.simplification import sources
 from mapweave.mapping.grids.cells import GridCells
 from mapweave.mapping.grids.virtual_scans import VirtualLaser, VirtualScanParameters
+from mapweave.mapping.grids.wall_cells import WallCells
 from mapweave.mapping.submap_builder import SubmapBuilder, SubmapParameters
 from mapweave.mapping.tracking.observation import ObservationParameters, observe
 from mapweave.maps import LineMap, MadeWith, RobotMap, Submap, Trajectory
@@ -36,11 +41,35 @@ def _walls(cells: GridCells, config: Config) -> LineMap:
     seeing = Config(
         sensor=Sensor(range_sigma=min(noise, 0.2)), robot=config.robot, mapping=config.mapping
     )
-    observing = ObservationParameters.of(seeing)
-    builder = SubmapBuilder(SubmapParameters.of(seeing))
-    for scan, pose in VirtualLaser(cells, VirtualScanParameters()).scans():
-        builder.add(scan, observe(scan, observing).segments, pose)
-    return LineMap.empty() if builder.is_empty else builder.line_map()
+    observing, p = ObservationParameters.of(seeing), SubmapParameters.of(seeing)
+    builder, laser = SubmapBuilder(p), VirtualLaser(cells, VirtualScanParameters())
+    sightings = [np.empty((0, 4))]
+    for scan, pose in laser.scans():
+        segments = observe(scan, observing).segments
+        builder.add(scan, segments, pose)
+        sightings.append(se2.transform_segments(pose, segments))
+    if builder.is_empty:
+        return LineMap.empty()
+    middles = np.asarray((np.argwhere(cells.wall)[:, ::-1] + 0.5) * cells.resolution, dtype=float)
+    occupied = WallCells(middles, laser.seen[cells.wall], cells.resolution)
+    return _held(builder.line_map().segments, sightings, occupied, p)
+
+
+def _held(
+    walls: FloatArray, sightings: list[FloatArray], cells: WallCells, p: SubmapParameters
+) -> LineMap:
+    """Return `walls` (n, 4) where there are cells, and others where they leave some out.
+
+    The `sightings` (k, 4) are those of each scan.
+    """
+    seen = np.concatenate(sightings)
+    scans = np.repeat(np.arange(len(sightings)), [len(each) for each in sightings])
+    held = cells.near(walls)
+    lines = np.concatenate([held, cells.missing(held, seen)])
+    wall, source = sources(lines, seen, p.simplification)
+    found, labels = np.unique(wall, return_inverse=True)
+    order, polyline = group_polylines(lines[found], p.max_gap)
+    return LineMap(lines[found][order], polyline, count_support(labels, scans[source])[order])
 
 
 def _free_space(cells: GridCells, config: Config) -> tuple[FloatArray, ...]:

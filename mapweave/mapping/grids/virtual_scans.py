@@ -42,18 +42,18 @@ class VirtualLaser:
         # The rim stops every beam.
         blocked[[0, -1], :] = blocked[:, [0, -1]] = True
         self._clear: FloatArray = scipy.ndimage.distance_transform_edt(~blocked)
+        self.seen: BoolArray = np.zeros_like(cells.wall)  # walls that the scans so far met
 
     def scans(self) -> Iterator[tuple[Scan, FloatArray]]:
         """Yield scans and their poses (3,) [m, m, rad]: of all that can be seen from somewhere."""
-        seen = np.zeros_like(self._cells.wall)
-        everywhere = np.ones_like(seen)
-        yield from self._numbered(self._places(everywhere, self._p.spacing), seen, 0)
+        everywhere = np.ones_like(self.seen)
+        yield from self._numbered(self._places(everywhere, self._p.spacing), 0)
         reach = self._p.near / self._cells.resolution
-        missed = self._cells.wall & ~seen
+        missed = self._cells.wall & ~self.seen
         if missed.any():
             about = scipy.ndimage.distance_transform_edt(~missed) <= reach
             count = len(self._places(everywhere, self._p.spacing))
-            yield from self._numbered(self._places(about, self._p.close_by), seen, count)
+            yield from self._numbered(self._places(about, self._p.close_by), count)
 
     def _places(self, where: BoolArray, spacing: float) -> IntArray:
         """(n, 2) row and column of free cells far from walls, one in each square of `spacing`."""
@@ -69,20 +69,16 @@ class VirtualLaser:
         row, column = np.divmod(best[i, j], size)
         return np.column_stack([i * size + row, j * size + column])
 
-    def _numbered(
-        self, places: IntArray, seen: BoolArray, first: int
-    ) -> Iterator[tuple[Scan, FloatArray]]:
-        """Yield the scan from each of `places` (n, 2), and note which walls are `seen`."""
+    def _numbered(self, places: IntArray, first: int) -> Iterator[tuple[Scan, FloatArray]]:
+        """Yield the scan from each of `places` (n, 2), and note which walls are seen."""
         angles = np.linspace(-np.pi, np.pi, self._p.beams, endpoint=False)
         for start in range(0, len(places), AT_ONCE):
             some = places[start : start + AT_ONCE]
-            for k, (place, ranges) in enumerate(
-                zip(some, self._cast(some, angles, seen), strict=True)
-            ):
+            for k, (place, ranges) in enumerate(zip(some, self._cast(some, angles), strict=True)):
                 x, y = (place[::-1] + 0.5) * self._cells.resolution
                 yield Scan(ranges, angles, first + start + k), np.array([x, y, 0.0])
 
-    def _cast(self, places: IntArray, angles: FloatArray, seen: BoolArray) -> FloatArray:
+    def _cast(self, places: IntArray, angles: FloatArray) -> FloatArray:
         """(n, beams) ranges [m] from the middles of `places` (n, 2); NaN where nothing is met."""
         limit = self._p.max_range / self._cells.resolution
         along = np.stack([np.sin(angles), np.cos(angles)], axis=-1)  # row, column
@@ -98,7 +94,7 @@ class VirtualLaser:
         met = self._dense[at[..., 0], at[..., 1]] & (gone < limit)
         _, nearest = self._cells.nearest_wall
         wall = nearest[:, at[..., 0], at[..., 1]]
-        seen[wall[0][met], wall[1][met]] = True
+        self.seen[wall[0][met], wall[1][met]] = True
         middle = np.moveaxis(wall, 0, -1) + 0.5 - begin
         ranges = (middle * along).sum(axis=-1) * self._cells.resolution
         return np.where(met & (ranges > 0), ranges, np.nan)

@@ -42,6 +42,10 @@ class AcceptanceParameters(BaseModel):
     margin: float = Field(0.2, gt=0, description="of score to the best different pose, the rival")
     rival_distance: float = Field(0.5, gt=0, description="[m] between rivals")
     rival_turn: float = Field(0.2, gt=0, description="[rad] between rivals")
+    same_distance: float = Field(
+        0.2, gt=0, description="[m] between fits that ended at one place, at the most"
+    )
+    same_turn: float = Field(0.1, gt=0, description="[rad] likewise")
     remarkable: float = Field(
         0.05, ge=0, description="surprise beyond which a pose is compared with everything else"
     )
@@ -142,7 +146,8 @@ def is_acceptable(
 ) -> bool:
     """Whether the best of all that was `found`, and counts, is taken, though it explains little.
 
-    As at the edge of the known: where the robot should be and undisputed, or without a rival.
+    As at the edge of the known: where the robot should be and undisputed, or without a rival, and
+    without a better place nearby.
     """
     p, evidence = parameters, best.evidence
     if _is_proven(best, found, p):
@@ -152,7 +157,20 @@ def is_acceptable(
     if evidence.disputed <= p.expected_dispute and best.surprise <= p.expected:
         return True
     doubt = evidence.disputed + p.leap * best.leap
-    return doubt <= p.max_doubt and evidence.score - _best_rival(best, found, p) >= p.margin
+    if doubt > p.max_doubt or evidence.score - _best_rival(best, found, p) < p.margin:
+        return False
+    return not _is_outdone_nearby(best, found, p)
+
+
+def _is_outdone_nearby(
+    best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters
+) -> bool:
+    """Whether another place, nearer than a rival, explains more than the best, which is likelier.
+
+    Then it is not known to some centimetres, as its walls would have it.
+    """
+    others = _different(best, found, p.same_distance, p.same_turn)
+    return any(t.evidence.score > best.evidence.score and not _is_slid(best, t, p) for t in others)
 
 
 def _is_proven(best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters) -> bool:
@@ -275,9 +293,14 @@ def _best_rival(best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParame
 def _rivals(
     best: ScanMatch, found: Sequence[ScanMatch], p: AcceptanceParameters
 ) -> list[ScanMatch]:
-    """Those that differ from `best`."""
+    """Those that are somewhere else than `best`."""
+    return _different(best, found, p.rival_distance, p.rival_turn)
+
+
+def _different(
+    best: ScanMatch, found: Sequence[ScanMatch], distance: float, turn: float
+) -> list[ScanMatch]:
+    """Those more than `distance` [m] or `turn` [rad] from `best`."""
     apart = se2.between(best.pose, np.stack([tracked.pose for tracked in found]))
-    different = (np.hypot(*apart[:, :2].T) > p.rival_distance) | (
-        np.abs(apart[:, 2]) > p.rival_turn
-    )
+    different = (np.hypot(*apart[:, :2].T) > distance) | (np.abs(apart[:, 2]) > turn)
     return [t for t, other in zip(found, different, strict=True) if other]

@@ -1,9 +1,11 @@
 """Another program's grid as a map: within a cell, facing the free side, and comparable."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 import shapely
 from numpy.typing import NDArray
 
@@ -12,8 +14,11 @@ from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.export import export
 from mapweave.io.grids.map_server import read_grid
+from mapweave.io.readers import read_scans
 from mapweave.mapping.grids.cells import GridCells
 from mapweave.mapping.grids.grid_map import map_of_grid
+from mapweave.mapping.grids.virtual_scans import VirtualLaser, VirtualScanParameters
+from mapweave.mapping.grids.wall_cells import MIN_CELLS
 from mapweave.mapping.mapper import Mapper
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave.scan.free_space import from_rings
@@ -39,6 +44,30 @@ def along(walls: FloatArray) -> FloatArray:
     return np.asarray((walls[:, :2] + shares * (walls[:, 2:] - walls[:, :2])).reshape(-1, 2))
 
 
+def middles(cells: NDArray[np.bool_]) -> FloatArray:
+    """(n, 2) [m] of those that are true."""
+    return np.asarray((np.argwhere(cells)[:, ::-1] + 0.5) * RESOLUTION)
+
+
+def worn(rng: np.random.Generator) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Walls and free cells of two rooms with a door."""
+    wall = np.zeros((160, 240), dtype=np.bool_)
+    wall[[20, 139], 20:220] = wall[20:140, [20, 120, 219]] = True
+    wall[70:90, 120] = False
+    for _ in range(12):  # drawn again, some cells aside
+        row, column = rng.integers(22, 110), rng.choice([20, 120, 219])
+        wall[row : row + 20, column + rng.integers(-4, 5)] = True
+        row, column = rng.choice([20, 139]), rng.integers(22, 190)
+        wall[row + rng.integers(-4, 5), column : column + 20] = True
+    for row, column in rng.integers(30, 130, size=(30, 2)):  # things that stood about
+        wall[row : row + rng.integers(1, 6), column : column + rng.integers(1, 6)] = True
+    for row, column in rng.integers(20, 130, size=(30, 2)):
+        wall[row : row + 6, column : column + 6] = False
+    free = np.zeros_like(wall)
+    free[25:135, 25:215] = True
+    return wall, free & ~wall
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.3, -2.0])
 def test_what_was_exported_is_read_back_within_a_cell(turn: float, tmp_path: Path) -> None:
     lines, pose = part(BUILDING, 0, 30), np.array([0.31, -0.22, turn])
@@ -51,6 +80,41 @@ def test_what_was_exported_is_read_back_within_a_cell(turn: float, tmp_path: Pat
         assert apart.max() < 2 * RESOLUTION  # the tips of corners
     free = [from_rings(each.free_space) for each in (found, expected)]
     assert shapely.symmetric_difference(*free).area < 0.04 * free[1].area
+
+
+def check_walls_and_cells(cells: GridCells) -> None:
+    """Check that each wall is within a cell of cells, and each run of seen cells of a wall."""
+    here = replace(cells, origin=np.zeros(3))
+    found = map_of_grid(here, "g").lines(0).segments
+    laser = VirtualLaser(here, VirtualScanParameters())
+    assert list(laser.scans())
+    off, _ = scipy.spatial.KDTree(middles(cells.wall)).query(along(found))
+    assert np.max(off) < A_CELL
+    left = laser.seen.copy()
+    left[left] = distance(middles(left), found) > A_CELL
+    runs, _ = scipy.ndimage.label(left, np.ones((3, 3)))
+    sizes = np.bincount(runs[left], minlength=1)
+    assert sizes[sizes >= MIN_CELLS].sum() <= 0.005 * laser.seen.sum()  # of no straight line
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_walls_are_where_cells_are_though_they_were_drawn_twice_with_gaps_and_clutter(
+    seed: int,
+) -> None:
+    wall, free = worn(np.random.default_rng(seed))
+    check_walls_and_cells(GridCells(wall, free, RESOLUTION, np.zeros(3)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("log", ["seattle", "intel-lab", "fr079"])
+def test_walls_are_where_cells_are_in_grids_of_recorded_logs(
+    log: str, data_dir: Path, tmp_path: Path
+) -> None:
+    mapper = Mapper("r1")
+    for scan in read_scans(data_dir / f"{log}.log.gz"):
+        mapper.add(scan)
+    export(mapper.finish(), tmp_path / "map.yaml")
+    check_walls_and_cells(read_grid(tmp_path / "map.yaml"))
 
 
 def test_a_walls_visible_side_is_the_free_one() -> None:

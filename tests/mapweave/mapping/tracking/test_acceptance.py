@@ -19,6 +19,7 @@ from mapweave.mapping.tracking.local_map import ScanEvidence
 
 P = AcceptanceParameters()
 HELD, OPEN = np.diag([30.0, 6.0, 50.0]), np.diag([30.0, 0.2, 50.0])
+ALONG_Y = np.diag([30.0, 0.2, 50.0])[[1, 0, 2]][:, [1, 0, 2]]  # open along x
 
 
 def pose(
@@ -72,6 +73,22 @@ def test_what_explains_half_and_is_held_may_be_disputed_and_take_a_leap() -> Non
     assert not is_acceptable(far, [far], P)
 
 
+def edge(x: float, explained: float, information: FloatArray = HELD) -> ScanMatch:
+    """Return a pose where much of what is seen is new."""
+    evidence = ScanEvidence(explained, 0.04, 0.0)
+    return ScanMatch(np.array([x, 0.0, 0.0]), evidence, information, surprise=0.08, leap=0.03)
+
+
+def test_what_explains_little_is_not_taken_where_a_place_nearby_explains_more() -> None:
+    """The likelier of two places half a metre apart is not known to some centimetres."""
+    best = edge(0.5, 0.45)
+    assert is_acceptable(best, [best, edge(0.55, 0.5)], P)  # the same place
+    assert is_acceptable(best, [best, edge(0.95, 0.4)], P)
+    assert not is_acceptable(best, [best, edge(0.95, 0.5)], P)
+    slid = edge(0.5, 0.45, ALONG_Y)
+    assert is_acceptable(slid, [slid, edge(0.95, 0.5, ALONG_Y)], P)  # its uncertainty says so
+
+
 def leapt(x: float, explained: float, *, turn: float = 0.0, information: FloatArray) -> ScanMatch:
     """Return a remarkable pose."""
     evidence = ScanEvidence(explained, 0.0, 0.0)
@@ -110,9 +127,6 @@ def test_what_may_have_come_since_does_not_hide_where_the_robot_is() -> None:
     assert not is_acceptable(blocked, [blocked], P) and tell_apart([blocked], P.novelty, P) == []
     elsewhere = ScanMatch(np.array([2.0, 0.0, 0.0]), people, HELD)
     assert not is_acceptable(among, [among, elsewhere], P)
-
-
-ALONG_Y = np.diag([30.0, 0.2, 50.0])[[1, 0, 2]][:, [1, 0, 2]]  # open along x
 
 
 def test_where_a_step_is_remarkable_it_is_said_how_far_along_it_may_be_instead() -> None:
