@@ -34,12 +34,16 @@ inline std::pair<Out<int64_t>, Out<int64_t>> nearest_parts(In<bool, 2> chosen) {
   const auto [r, c] = rasters::sides(static_cast<int64_t>(chosen.shape(0)), static_cast<int64_t>(chosen.shape(1)));
   const size_t size = static_cast<size_t>(r) * c;
   std::vector<int64_t> label(size, 0), nearest(size, 0);
-  if (number(chosen.data(), r, c, label) > 0)
+  if (number(chosen.data(), r, c, label) > 0) {
+    std::vector<uint8_t> seeds(size);
+    for (size_t k = 0; k < size; ++k) seeds[k] = label[k] > 0;
     rasters::Distances(r, c).find(
-        [&, c = c](int32_t i, int32_t j) { return label[static_cast<size_t>(i) * c + j] > 0; },
-        [&](size_t at, size_t count, int64_t, int64_t, size_t seed) {
+        seeds.data(),
+        [&](size_t at, size_t count, size_t seed) {
           std::fill_n(nearest.begin() + static_cast<int64_t>(at), count, label[seed]);
-        });
+        },
+        [](int32_t, const double*) {});
+  }
   const std::initializer_list<size_t> shape = {static_cast<size_t>(r), static_cast<size_t>(c)};
   return {give(std::move(label), shape), give(std::move(nearest), shape)};
 }

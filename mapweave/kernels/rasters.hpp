@@ -9,99 +9,115 @@
 
 namespace rasters {
 
-constexpr int32_t kNone = -1;
+constexpr int32_t kNone = -(1 << 30);  // farther than any row
+
+// The nearest seed so far, row `i` and above: its row.
+MAPWEAVE_WIDE inline void go_down(int32_t* __restrict row, const int32_t* __restrict above,
+                                  const uint8_t* __restrict seeds, int32_t columns, int32_t i) {
+  for (int32_t j = 0; j < columns; ++j) row[j] = seeds[j] ? i : above[j];
+}
+
+// So far the nearest seed above; from below where that is nearer.
+MAPWEAVE_WIDE inline void go_up(int32_t* __restrict row, const int32_t* __restrict below, int32_t columns, int32_t i) {
+  for (int32_t j = 0; j < columns; ++j) row[j] = (below[j] > i) & (below[j] - i < i - row[j]) ? below[j] : row[j];
+}
+
+// [m] of squared cells.
+MAPWEAVE_WIDE inline void measure(float* __restrict metres, const double* __restrict squared, int32_t count,
+                                  double cell) {
+  for (int32_t k = 0; k < count; ++k) metres[k] = static_cast<float>(std::sqrt(squared[k]) * cell);
+}
 
 // The nearest seed to each cell and how far it is: column by column, then the lower envelope of each row's parabolas.
 // Of seeds equally near, the one in the lower column, then the lower row.
 class Distances {
  public:
   Distances(int32_t rows, int32_t columns)
-      : rows_(rows), columns_(columns), row_(static_cast<size_t>(rows) * columns, kNone), stack_(columns),
-        from_(columns), height_(columns) {}
+      : rows_(rows), columns_(columns), row_(static_cast<size_t>(rows) * columns), stack_(columns), from_(columns),
+        height_(columns), squared_(columns) {}
 
-  // Calls `tell(cell, columns from the seed, squared rows from it, seed's cell)`; nothing where there is no seed.
-  template <typename IsSeed, typename Tell>
-  void find(IsSeed is_seed, Tell tell) {
-    down(is_seed);
-    up();
+  // Calls `tell(first cell, cells, seed's cell)` for runs of cells, `end_row(row, squared cells to the seeds)` for rows.
+  // `seeds`: which cells are, one at least.
+  template <typename Tell, typename EndRow>
+  void find(const uint8_t* seeds, Tell tell, EndRow end_row) {
+    const std::vector<int32_t> none(columns_, kNone);
+    for (int32_t i = 0; i < rows_; ++i)
+      go_down(row(i), i > 0 ? row(i - 1) : none.data(), seeds + static_cast<size_t>(i) * columns_, columns_, i);
+    for (int32_t i = rows_ - 2; i >= 0; --i) go_up(row(i), row(i + 1), columns_, i);
     for (int32_t i = 0; i < rows_; ++i) {
-      const int32_t count = across(i);
-      for (int32_t k = 0; k < count; ++k) {
-        const int32_t column = stack_[k], first = static_cast<int32_t>(from_[k]);
-        const int32_t last = k + 1 < count ? static_cast<int32_t>(from_[k + 1]) : columns_;
-        const size_t begin = static_cast<size_t>(i) * columns_;
-        tell(begin + first, static_cast<size_t>(last - first), first - column, height_[column],
-             static_cast<size_t>(row_[begin + column]) * columns_ + column);
+      for (int32_t j = 0, end = 0; j < columns_; j = end) {
+        for (end = j; end < columns_ && row(i)[end] == i; ++end) tell_seed(i, end, tell);
+        const int32_t first = end;
+        while (end < columns_ && row(i)[end] != i) ++end;
+        if (end > first) between_seeds(i, first, end, tell);
       }
+      end_row(i, squared_.data());
     }
   }
 
  private:
-  template <typename IsSeed>
-  void down(IsSeed is_seed) {
-    for (int32_t i = 0; i < rows_; ++i) {
-      int32_t* row = row_.data() + static_cast<size_t>(i) * columns_;
-      for (int32_t j = 0; j < columns_; ++j)
-        row[j] = is_seed(i, j) ? i : (i > 0 ? row[j - columns_] : kNone);
-    }
+  int32_t* row(int32_t i) { return row_.data() + static_cast<size_t>(i) * columns_; }
+
+  template <typename Tell>
+  void tell_seed(int32_t i, int32_t j, Tell tell) {
+    const size_t cell = static_cast<size_t>(i) * columns_ + j;
+    tell(cell, 1, cell);
+    squared_[j] = 0;
   }
 
-  // So far the nearest seed above; from below where that is nearer.
-  void up() {
-    for (int32_t i = rows_ - 2; i >= 0; --i) {
-      int32_t* row = row_.data() + static_cast<size_t>(i) * columns_;
-      for (int32_t j = 0; j < columns_; ++j) {
-        const int32_t below = row[j + columns_];
-        if (below > i && (row[j] == kNone || below - i < i - row[j])) row[j] = below;
+  // Of cells of a row between two that are seeds: no seed beyond those is nearer.
+  template <typename Tell>
+  void between_seeds(int32_t i, int32_t first, int32_t end, Tell tell) {
+    const size_t begin = static_cast<size_t>(i) * columns_;
+    const int32_t count = across(i, std::max(first - 1, 0), std::min(end + 1, columns_));
+    for (int32_t k = 0; k < count; ++k) {
+      const int32_t column = stack_[k], low = std::max(static_cast<int32_t>(from_[k]), first);
+      const int32_t high = std::min(k + 1 < count ? static_cast<int32_t>(from_[k + 1]) : end, end);
+      if (high <= low) continue;
+      tell(begin + low, static_cast<size_t>(high - low), static_cast<size_t>(row(i)[column]) * columns_ + column);
+      for (int32_t j = low; j < high; ++j) {
+        const double apart = j - column;
+        squared_[j] = apart * apart + static_cast<double>(height_[column]);
       }
     }
   }
 
-  // How many columns of row `i` have cells to which their seed is nearest: `stack_`, each from `from_` on.
-  int32_t across(int32_t i) {
-    const int32_t* row = row_.data() + static_cast<size_t>(i) * columns_;
+  // How many columns from `first` to before `end` have cells in row `i` to which their seed is nearest: `stack_`, each
+  // from `from_` on.
+  int32_t across(int32_t i, int32_t first, int32_t end) {
+    const int32_t* nearest = row(i);
     int32_t count = 0;
-    for (int32_t j = 0; j < columns_; ++j) {
-      if (row[j] == kNone) continue;
-      const int64_t apart = row[j] - i;
+    for (int32_t j = first; j < end; ++j) {
+      if (nearest[j] == kNone) continue;
+      const int64_t apart = nearest[j] - i;
       height_[j] = apart * apart;
-      int64_t begins = 0;
-      while (count > 0) {
-        begins = first_nearer(stack_[count - 1], j);
-        if (begins > from_[count - 1]) break;
-        --count;
-      }
-      if (count == 0) begins = 0;
-      if (begins >= columns_) continue;
-      stack_[count] = j;
-      from_[count++] = begins;
+      while (count > 0 && sum(stack_[count - 1], j) < from_[count - 1] * twice(stack_[count - 1], j)) --count;
+      if (count > 0 && sum(stack_[count - 1], j) >= (end - 1) * twice(stack_[count - 1], j)) continue;
+      from_[count] = count > 0 ? first_nearer(stack_[count - 1], j) : first;
+      stack_[count++] = j;
     }
     return count;
   }
 
+  // The seeds of columns `a` and `b` after it are as far from where the sum is by twice the column.
+  int64_t sum(int32_t a, int32_t b) const {
+    return static_cast<int64_t>(b) * b - static_cast<int64_t>(a) * a + height_[b] - height_[a];
+  }
+  static int64_t twice(int32_t a, int32_t b) { return 2 * static_cast<int64_t>(b - a); }
+
   // The first column from which on the seed of column `b` is nearer than that of column `a` before it.
   int64_t first_nearer(int32_t a, int32_t b) const {
-    const int64_t higher = height_[b] - height_[a];
-    if (b == a + 1 && higher == 0) return b;
-    const int64_t sum = static_cast<int64_t>(b) * b - static_cast<int64_t>(a) * a + higher;
-    const int64_t twice = 2 * static_cast<int64_t>(b - a);
+    if (b == a + 1 && height_[a] == height_[b]) return b;
     // Exact: quotients of whole numbers so small are no nearer to a whole number than rounding moves them.
-    return sum < 0 ? 0 : static_cast<int64_t>(static_cast<double>(sum) / static_cast<double>(twice)) + 1;
+    return static_cast<int64_t>(static_cast<double>(sum(a, b)) / static_cast<double>(twice(a, b))) + 1;
   }
 
   int32_t rows_, columns_;
   std::vector<int32_t> row_;  // of the seed nearest in the column
   std::vector<int32_t> stack_;
   std::vector<int64_t> from_, height_;
+  std::vector<double> squared_;
 };
-
-// [m] for a run of cells of one row.
-inline void measure(float* metres, size_t count, int64_t off, int64_t height, double cell) {
-  for (size_t k = 0; k < count; ++k) {
-    const double apart = static_cast<double>(off) + static_cast<double>(k);
-    metres[k] = static_cast<float>(std::sqrt(apart * apart + static_cast<double>(height)) * cell);
-  }
-}
 
 inline int32_t side(int64_t cells, const char* message) {
   if (cells < 1 || cells > 1'000'000) throw std::invalid_argument(message);
@@ -121,19 +137,23 @@ inline std::pair<Out<int32_t>, Out<float>> nearest_samples(In<double, 2> points,
   const auto [r, c] = sides(rows, columns);
   if (points.shape(1) != 2 || points.shape(0) == 0 || origin.shape(0) != 2 || !(cell > 0))
     throw std::invalid_argument("points (n, 2), one at least, origin (2,), cell > 0 expected");
-  std::vector<int32_t> owner(static_cast<size_t>(r) * c, kNone);
+  std::vector<int32_t> owner(static_cast<size_t>(r) * c);
+  std::vector<uint8_t> seeds(owner.size(), 0);
   for (size_t k = 0; k < points.shape(0); ++k) {
     const double x = std::floor((points(k, 0) - origin(0)) / cell), y = std::floor((points(k, 1) - origin(1)) / cell);
     if (!(x >= 0 && y >= 0 && x < r && y < c)) throw std::invalid_argument("points: inside of the raster expected");
-    owner[static_cast<size_t>(x) * c + static_cast<size_t>(y)] = static_cast<int32_t>(k);
+    const size_t at = static_cast<size_t>(x) * c + static_cast<size_t>(y);
+    owner[at] = static_cast<int32_t>(k);
+    seeds[at] = 1;
   }
   std::vector<int32_t> nearest(owner.size());
   std::vector<float> metres(owner.size());
-  Distances(r, c).find([&, c = c](int32_t i, int32_t j) { return owner[static_cast<size_t>(i) * c + j] != kNone; },
-                       [&](size_t at, size_t count, int64_t off, int64_t height, size_t seed) {
-                         std::fill_n(nearest.begin() + at, count, owner[seed]);
-                         measure(metres.data() + at, count, off, height, cell);
-                       });
+  Distances(r, c).find(
+      seeds.data(),
+      [&](size_t at, size_t count, size_t seed) { std::fill_n(nearest.begin() + at, count, owner[seed]); },
+      [&, c = c](int32_t i, const double* squared) {
+        measure(metres.data() + static_cast<size_t>(i) * c, squared, c, cell);
+      });
   return {give(std::move(nearest), {owner.size() / c, static_cast<size_t>(c)}),
           give(std::move(metres), {owner.size() / c, static_cast<size_t>(c)})};
 }
@@ -205,18 +225,16 @@ inline Out<float> depths(In<double, 2> corners, In<int64_t, 1> starts, In<double
                          int64_t columns) {
   const auto [r, c] = sides(rows, columns);
   const std::vector<uint8_t> filled = fill(corners, starts, origin, cell, r, c);
-  std::vector<float> padded(static_cast<size_t>(r + 2) * (c + 2));
-  Distances(r + 2, c + 2).find(
-      [&, r = r, c = c](int32_t i, int32_t j) {
-        return i == 0 || j == 0 || i > r || j > c || !filled[static_cast<size_t>(i - 1) * c + (j - 1)];
-      },
-      [&](size_t at, size_t count, int64_t off, int64_t height, size_t) {
-        measure(padded.data() + at, count, off, height, cell);
-      });
-  std::vector<float> depth(filled.size());
+  std::vector<uint8_t> empty(static_cast<size_t>(r + 2) * (c + 2), 1);
   for (int32_t i = 0; i < r; ++i)
-    std::copy_n(padded.begin() + static_cast<size_t>(i + 1) * (c + 2) + 1, c,
-                depth.begin() + static_cast<size_t>(i) * c);
+    for (int32_t j = 0; j < c; ++j)
+      empty[static_cast<size_t>(i + 1) * (c + 2) + j + 1] = !filled[static_cast<size_t>(i) * c + j];
+  std::vector<float> depth(filled.size());
+  Distances(r + 2, c + 2).find(
+      empty.data(), [](size_t, size_t, size_t) {},
+      [&, r = r, c = c](int32_t i, const double* squared) {
+        if (i > 0 && i <= r) measure(depth.data() + static_cast<size_t>(i - 1) * c, squared + 1, c, cell);
+      });
   return give(std::move(depth), {static_cast<size_t>(r), static_cast<size_t>(c)});
 }
 

@@ -13,35 +13,84 @@ namespace shifts {
 constexpr int kFacings = 8;   // in wide cells: 45° each
 constexpr double kCentimetre = 0.01;
 
-constexpr int64_t kAtOnce = 8;  // cells added: rows go on with as many that say nothing, and so do all sums
+constexpr int64_t kAtOnce = 16;   // cells added: rows go on with as many that say nothing, and so do all sums
+constexpr int32_t kMost = 32767;  // that a narrow number holds: sixteen of them are added at a time
+constexpr int64_t kBlock = 8;     // cells a side, of which walls are added together: around a map as many say nothing
+constexpr int kTogether = 4;      // walls
 
-// Adds the used parts of rows to those of sums, times `metres`. Whole numbers, small enough for exact sums in single
-// precision: no order of adding tells.
-MAPWEAVE_WIDE inline void add_rows(float* __restrict sums, int64_t stride, const float* __restrict worth,
-                                   int64_t columns, const std::pair<int64_t, int64_t>* used, int64_t rows,
-                                   float metres) {
-  for (int64_t i = 0; i < rows; ++i)
-    for (int64_t k = used[i].first; k < used[i].second; k += kAtOnce) {
-      float* sum = sums + i * stride + k;
-      const float* row = worth + i * columns + k;
-      for (int64_t u = 0; u < kAtOnce; ++u) sum[u] += metres * row[u];
-    }
+using Span = std::pair<int64_t, int64_t>;
+
+// What is added for some walls of a block: of each, what counts where from the block's first row and column on.
+struct Group {
+  const int16_t* worth[kTogether];
+  int16_t metres[kTogether];
+  int64_t rows;  // that any of them reaches
+
+  // As the `k`th the wall that is so far `down` and `right`, and counts in `map`.
+  template <typename Map>
+  void take(int k, int facing, int32_t centimetres, int64_t down, int64_t right, const Map& map) {
+    worth[k] = map.worth(facing) - down * map.stride() - right;
+    metres[k] = static_cast<int16_t>(centimetres);
+    rows = std::max(k > 0 ? rows : 0, map.rows() + down);
+  }
+};
+
+// Adds the used parts of rows to those of sums, times metres. Whole numbers: no order of adding tells.
+MAPWEAVE_WIDE inline void add_rows(int16_t* __restrict sums, int64_t stride, const Group& group, int64_t columns,
+                                   const Span* used) {
+  const int16_t m0 = group.metres[0], m1 = group.metres[1], m2 = group.metres[2], m3 = group.metres[3];
+  const int16_t *r0 = group.worth[0], *r1 = group.worth[1], *r2 = group.worth[2], *r3 = group.worth[3];
+  for (int64_t i = 0; i < group.rows; ++i) {
+    const auto [first, last] = used[i / kBlock];
+    for (int64_t k = first; k < last; k += kAtOnce)
+      for (int64_t u = k; u < k + kAtOnce; ++u)
+        sums[u] = static_cast<int16_t>(sums[u] + (m0 * r0[u] + m1 * r1[u]) + (m2 * r2[u] + m3 * r3[u]));
+    sums += stride, r0 += columns, r1 += columns, r2 += columns, r3 += columns;
+  }
 }
 
-MAPWEAVE_WIDE inline void add_up(float* __restrict sums, const float* __restrict twice, const float* __restrict once,
-                                 const float* __restrict other, const float* __restrict seen, size_t count) {
-  for (size_t k = 0; k < count; ++k) sums[k] = 2 * twice[k] + once[k] + other[k] + seen[k];
+MAPWEAVE_WIDE inline void add_up(int16_t* __restrict sums, const int16_t* __restrict twice,
+                                 const int16_t* __restrict once, const int16_t* __restrict other,
+                                 const int16_t* __restrict seen, size_t count) {
+  for (size_t k = 0; k < count; ++k) sums[k] = static_cast<int16_t>(2 * twice[k] + once[k] + other[k] + seen[k]);
+}
+
+// The greatest of `count` numbers, whichever their signs.
+MAPWEAVE_WIDE inline int16_t greatest(const int16_t* numbers, size_t count) {
+  int16_t most = 0, least = 0;
+  for (size_t k = 0; k < count; ++k) most = std::max(most, numbers[k]), least = std::min(least, numbers[k]);
+  return std::max<int16_t>(most, static_cast<int16_t>(-least));
+}
+
+// Adds the narrow sums to the wide ones; nothing is left in them.
+MAPWEAVE_WIDE inline void move_up(int32_t* __restrict sums, int16_t* __restrict narrow, size_t count) {
+  for (size_t k = 0; k < count; ++k) sums[k] += narrow[k], narrow[k] = 0;
+}
+
+inline bool any_above(const int32_t* sums, int64_t count, int32_t least) {
+  int32_t most = least;
+  for (int64_t k = 0; k < count; ++k) most = std::max(most, sums[k]);
+  return most > least;
+}
+
+// The wide cells of places along a line, of which these are the turned coordinates' parts.
+MAPWEAVE_WIDE inline void find_cells(int32_t* __restrict cells, const double* __restrict along, double across,
+                                     double low, double width, size_t count) {
+  for (size_t k = 0; k < count; ++k) cells[k] = static_cast<int32_t>((across + along[k] - low) / width);
 }
 
 struct Wall {
   int64_t row, column;
   int facing;
-  float metres;  // [cm], whole
+  int32_t metres;  // [cm]
+
+  std::pair<int64_t, int64_t> block() const { return {row / kBlock, column / kBlock}; }
 };
 
 // Memory that is kept from one turn to the next, and from call to call: to ask for it anew takes longer than to fill it.
 struct Memory {
-  std::vector<float> near, seen, worth[2], sums;
+  std::vector<int16_t> near, seen, worth[2], narrow;
+  std::vector<int32_t> sums;
   std::vector<double> metres;  // all 0 between two maps
 
   // Lets go of it where it was much.
@@ -51,15 +100,24 @@ struct Memory {
   }
 };
 
+// That cells are narrow enough for narrow sums, and samples in their raster.
+inline void check(const place_views::PlaceView& view, double width, int64_t weight) {
+  const double side = width / (2 * view.cell()) + 2;  // more cells than are looked at along a wide one
+  if (2 * kTogether * static_cast<double>(std::max<int64_t>(weight, 1)) * side * side > kMost)
+    throw std::invalid_argument("width: of fewer cells expected");
+  for (size_t k = 0; k < view.samples(); ++k)
+    if (!view.holds(view.sample(k)[0], view.sample(k)[1]))
+      throw std::invalid_argument("samples: inside of the raster expected");
+}
+
 // A map at one turn, in wide cells: what a metre of wall counts in each, by the way it faces, from the far corner on
 // where it is `reversed`; and its walls.
 class WideMap {
  public:
-  WideMap(const place_views::PlaceView& view, double turn, double width, int64_t directions, float weight,
+  WideMap(const place_views::PlaceView& view, double turn, double width, int64_t directions, int64_t weight,
           bool reversed, Memory& memory)
       : cosine_(std::cos(turn)), sine_(std::sin(turn)), turns_(turn / 6.283185307179586476925286766559 + 2),
         width_(width), reversed_(reversed), worth_(memory.worth[reversed]) {
-    check(view);
     frame(view);
     count_cells(view, directions, weight, memory);
     collect_walls(view, memory.metres);
@@ -70,13 +128,17 @@ class WideMap {
   int64_t rows() const { return rows_; }
   int64_t columns() const { return columns_; }
   const std::vector<Wall>& walls() const { return walls_; }
-  // Rows are `stride` apart: after the last column nothing is said.
-  const float* worth(int facing) const { return worth_.data() + facing * rows_ * stride(); }
-  int64_t stride() const { return columns_ + kAtOnce; }
-  // From where to where each row says anything.
-  const std::pair<int64_t, int64_t>* used() const { return used_.data(); }
+  // Rows are `stride` apart: around the map nothing is said.
+  const int16_t* worth(int facing) const { return worth_.data() + facing * plane() + kBlock * stride() + kBlock; }
+  // The greatest worth, or the least, whichever its sign; 1 where nothing is said.
+  int32_t most() const { return most_; }
+  int64_t stride() const { return columns_ + kAtOnce + 2 * kBlock; }
+  // From where to where a block's rows say anything, of walls anywhere in a block of theirs.
+  const Span* used() const { return used_.data(); }
 
  private:
+  int64_t plane() const { return (rows_ + 2 * kBlock) * stride(); }
+
   void frame(const place_views::PlaceView& view) {
     double high[2] = {-1e300, -1e300}, low[2] = {1e300, 1e300};
     for (int corner = 0; corner < 4; ++corner) {
@@ -99,71 +161,88 @@ class WideMap {
     return {static_cast<int64_t>((x - x_) / width_), static_cast<int64_t>((y - y_) / width_)};
   }
 
+  std::pair<int64_t, int64_t> there(int64_t row, int64_t column) const {
+    return reversed_ ? std::pair(rows_ - 1 - row, columns_ - 1 - column) : std::pair(row, column);
+  }
+
   int facing(double turn) const {
     return static_cast<int>(static_cast<int64_t>((turn + turns_) * kFacings + 0.5)) & (kFacings - 1);
   }
 
   // Wall counts 2 for each cell near a wall that faces as it does, 1 where that is the next facing; every second row
   // and column.
-  void count_cells(const place_views::PlaceView& view, int64_t directions, float weight, Memory& memory) {
-    const size_t size = static_cast<size_t>(rows_ * stride());
-    memory.near.assign(kFacings * size, 0.0f);
-    memory.seen.assign(size, 0.0f);
-    used_.assign(static_cast<size_t>(rows_), {columns_, 0});
+  void count_cells(const place_views::PlaceView& view, int64_t directions, int64_t weight, Memory& memory) {
+    const size_t size = static_cast<size_t>(plane());
+    memory.near.assign(kFacings * size, 0);
+    memory.seen.assign(size, 0);
+    used_.assign(static_cast<size_t>(rows_ / kBlock + 2), {columns_, 0});
     std::vector<int> facings(directions);
     for (int64_t d = 0; d < directions; ++d)
       facings[d] = facing((static_cast<double>(d) + 0.5) / static_cast<double>(directions));
-    for (int64_t i = 0; i < view.rows(); i += 2)
-      for (int64_t j = 0; j < view.columns(); j += 2) {
-        const int64_t code = view.code(i, j);
+    const size_t across = static_cast<size_t>((view.columns() + 1) / 2);
+    std::vector<double> along(2 * across);  // what y adds to turned coordinates
+    for (size_t k = 0; k < across; ++k) {
+      const double y = view.centre(0, 2 * static_cast<int64_t>(k)).second;
+      along[k] = -(sine_ * y), along[across + k] = cosine_ * y;
+    }
+    std::vector<int32_t> found(2 * across);
+    for (int64_t i = 0; i < view.rows(); i += 2) {
+      const double x = view.centre(i, 0).first;
+      find_cells(found.data(), along.data(), cosine_ * x, x_, width_, across);
+      find_cells(found.data() + across, along.data() + across, sine_ * x, y_, width_, across);
+      for (size_t k = 0; k < across; ++k) {
+        const int64_t code = view.code(i, 2 * static_cast<int64_t>(k));
         if (code == directions) continue;
-        const auto [row, column] = cell(view.centre(i, j));
-        const int64_t i_there = reversed_ ? rows_ - 1 - row : row, j_there = reversed_ ? columns_ - 1 - column : column;
-        const size_t place = static_cast<size_t>(i_there * stride() + j_there);
-        auto& [first, last] = used_[i_there];
-        first = std::min(first, j_there), last = std::max(last, j_there + 1);
+        const auto [i_there, j_there] = there(found[k], found[across + k]);
+        const size_t place = static_cast<size_t>((i_there + kBlock) * stride() + j_there + kBlock);
+        auto& [first, last] = used_[i_there / kBlock];
+        first = std::min(first, j_there), last = std::max(last, j_there + kBlock);
         if (code > directions)
-          memory.seen[place] -= 2 * weight;
+          memory.seen[place] = static_cast<int16_t>(memory.seen[place] - 2 * weight);
         else
-          memory.near[facings[code] * size + place] += 1;
+          ++memory.near[facings[code] * size + place];
       }
+    }
+    for (size_t b = used_.size() - 1; b > 0; --b)  // walls further down in their block
+      used_[b] = {std::min(used_[b].first, used_[b - 1].first), std::max(used_[b].second, used_[b - 1].second)};
     worth_.resize(kFacings * size);
     const auto near = [&](int f) { return memory.near.data() + (f & (kFacings - 1)) * size; };
     for (int f = 0; f < kFacings; ++f)
       add_up(worth_.data() + f * size, near(f), near(f + 1), near(f - 1), memory.seen.data(), size);
-  }
-
-  void check(const place_views::PlaceView& view) const {
-    for (size_t k = 0; k < view.samples(); ++k)
-      if (!view.holds(view.sample(k)[0], view.sample(k)[1]))
-        throw std::invalid_argument("samples: inside of the raster expected");
+    most_ = std::max<int32_t>(greatest(worth_.data(), worth_.size()), 1);
   }
 
   void collect_walls(const place_views::PlaceView& view, std::vector<double>& metres) {
     const size_t size = static_cast<size_t>(rows_ * columns_);
     if (metres.size() < kFacings * size) metres.resize(kFacings * size, 0.0);
-    std::vector<size_t> found;
+    std::vector<size_t> found(view.samples());
+    size_t count = 0;
     for (size_t k = 0; k < view.samples(); ++k) {
       const double* p = view.sample(k);
       const auto [row, column] = cell({p[0], p[1]});
       const size_t place = facing(p[2]) * size + static_cast<size_t>(row * columns_ + column);
-      if (metres[place] == 0 && p[3] > 0) found.push_back(place);
+      found[count] = place;
+      count += metres[place] == 0 && p[3] > 0;
       metres[place] += p[3];
     }
+    found.resize(count);
     for (const size_t place : found) {
       const int64_t in_plane = static_cast<int64_t>(place % size);
-      walls_.push_back({in_plane / columns_, in_plane % columns_, static_cast<int>(place / size),
-                        static_cast<float>(std::nearbyint(metres[place] / kCentimetre))});
+      const auto [row, column] = there(in_plane / columns_, in_plane % columns_);
+      walls_.push_back({row, column, static_cast<int>(place / size),
+                        static_cast<int32_t>(std::nearbyint(metres[place] / kCentimetre))});
       metres[place] = 0;
     }
+    std::sort(walls_.begin(), walls_.end(), [](const Wall& a, const Wall& b) { return a.block() < b.block(); });
   }
 
   double cosine_, sine_, turns_, width_, x_ = 0, y_ = 0;
   bool reversed_;
   int64_t rows_ = 0, columns_ = 0;
-  std::vector<float>& worth_;
+  int32_t most_ = 1;
+  std::vector<int16_t>& worth_;
   std::vector<Wall> walls_;
-  std::vector<std::pair<int64_t, int64_t>> used_;
+  std::vector<Span> used_;
 };
 
 // What every shift of a map over another counts, which is reversed.
@@ -171,11 +250,12 @@ class Sums {
  public:
   Sums(const WideMap& reference, const WideMap& other, Memory& memory)
       : rows_(reference.rows() + other.rows() - 1), columns_(reference.columns() + other.columns() - 1),
-        sum_(memory.sums) {
-    sum_.assign(static_cast<size_t>(rows_ * columns_ + kAtOnce), 0.0f);
-    for (const Wall& w : other.walls())
-      add(reference, w, other.rows() - 1 - w.row, other.columns() - 1 - w.column);
-    for (const Wall& w : reference.walls()) add(other, w, w.row, w.column);
+        sum_(memory.sums), narrow_(memory.narrow) {
+    sum_.assign(static_cast<size_t>(rows_ * columns_), 0);
+    narrow_.assign(sum_.size() + kAtOnce + kBlock, 0);
+    add(reference, other.walls());
+    add(other, reference.walls());
+    move_up(sum_.data(), narrow_.data(), sum_.size());
   }
 
   int64_t columns() const { return columns_; }
@@ -185,11 +265,15 @@ class Sums {
   std::vector<int64_t> peaks(int64_t count) const {
     const auto better = [&](int64_t a, int64_t b) { return sum_[a] != sum_[b] ? sum_[a] > sum_[b] : a < b; };
     std::vector<int64_t> best;  // a heap with the worst of them at its top
-    float least = 0;
+    int32_t least = 0;
     for (int64_t i = 0; i < rows_ && count > 0; ++i)
       for (int64_t j = 0; j < columns_; ++j) {
         const int64_t place = i * columns_ + j;
-        if (!(sum_[place] > least) || !is_peak(i, j)) continue;
+        if (j % kAtOnce == 0 && !any_above(sum_.data() + place, std::min(kAtOnce, columns_ - j), least)) {
+          j += kAtOnce - 1;  // none of these
+          continue;
+        }
+        if (sum_[place] <= least || !is_peak(i, j)) continue;
         if (static_cast<int64_t>(best.size()) == count) {
           std::pop_heap(best.begin(), best.end(), better);
           best.pop_back();
@@ -211,13 +295,39 @@ class Sums {
   }
 
  private:
-  void add(const WideMap& map, const Wall& wall, int64_t down, int64_t right) {
-    add_rows(sum_.data() + down * columns_ + right, columns_, map.worth(wall.facing), map.stride(),
-             map.used(), map.rows(), wall.metres);
+  // What `walls` of the other map count in `map`, at their shifts.
+  void add(const WideMap& map, const std::vector<Wall>& walls) {
+    const int32_t most = kMost / (kTogether * map.most());
+    std::vector<Wall> some;
+    for (const Wall& wall : walls)
+      for (int32_t left = wall.metres; left > 0; left -= most) {
+        if (some.size() == kTogether || (!some.empty() && some[0].block() != wall.block())) add_block(map, some);
+        some.push_back(wall);
+        some.back().metres = std::min(left, most);
+      }
+    if (!some.empty()) add_block(map, some);
+  }
+
+  // In narrow sums, which are moved up before they could be too large.
+  void add_block(const WideMap& map, std::vector<Wall>& walls) {
+    int64_t row = walls[0].row, column = walls[0].column;
+    int32_t added = 0;
+    for (const Wall& w : walls)
+      row = std::min(row, w.row), column = std::min(column, w.column), added += w.metres * map.most();
+    if (held_ + added > kMost) {
+      move_up(sum_.data(), narrow_.data(), sum_.size());
+      held_ = 0;
+    }
+    held_ += added;
+    walls.resize(kTogether, {walls[0].row, walls[0].column, walls[0].facing, 0});
+    Group group;
+    for (int k = 0; k < kTogether; ++k) group.take(k, walls[k].facing, walls[k].metres, walls[k].row - row, walls[k].column - column, map);
+    add_rows(narrow_.data() + row * columns_ + column, columns_, group, map.stride(), map.used());
+    walls.clear();
   }
 
   bool is_peak(int64_t i, int64_t j) const {
-    const float here = sum_[i * columns_ + j];
+    const int32_t here = sum_[i * columns_ + j];
     for (int64_t r = std::max<int64_t>(i - 1, 0); r <= std::min(i + 1, rows_ - 1); ++r)
       for (int64_t c = std::max<int64_t>(j - 1, 0); c <= std::min(j + 1, columns_ - 1); ++c)
         if (sum_[r * columns_ + c] > here) return false;
@@ -230,7 +340,9 @@ class Sums {
   }
 
   int64_t rows_, columns_;
-  std::vector<float>& sum_;
+  int32_t held_ = 0;  // no narrow sum is above it
+  std::vector<int32_t>& sum_;
+  std::vector<int16_t>& narrow_;
 };
 
 inline std::pair<Out<double>, Out<double>> best_shifts(const place_views::PlaceView& reference,
@@ -240,13 +352,14 @@ inline std::pair<Out<double>, Out<double>> best_shifts(const place_views::PlaceV
   if (!(width > 1e-3) || directions < 1 || directions > 254 || weight < 0 || weight > 100 || count < 0)
     throw std::invalid_argument("width > 0, 1 to 254 directions, weight of 0 to 100, count >= 0 expected");
   std::vector<double> found, scores;
+  for (const auto* view : {&reference, &other}) check(*view, width, weight);
   static thread_local Memory memory;
-  const WideMap here(reference, 0.0, width, directions, static_cast<float>(weight), false, memory);
+  const WideMap here(reference, 0.0, width, directions, weight, false, memory);
   // Of the cells looked at so many lie in a wide one; both ways are added up, and each counts 2.
   const double cells = width * width / (4 * reference.cell() * other.cell()), unit = kCentimetre / (4 * cells);
   for (size_t t = 0; t < turns.shape(0); ++t) {
     if (!(std::abs(turns(t)) < 7)) throw std::invalid_argument("turns: angles within a turn expected");
-    const WideMap there(other, turns(t), width, directions, static_cast<float>(weight), true, memory);
+    const WideMap there(other, turns(t), width, directions, weight, true, memory);
     const Sums sums(here, there, memory);
     for (const int64_t place : sums.peaks(count)) {
       const auto [i, j] = sums.top(place);

@@ -108,7 +108,8 @@ class DistanceField:
     @cached_property
     def own_depth(self) -> Float32Array:
         """(n,) how deep each sample lies in the free space of its own map [m]."""
-        return self.look_up(self.oriented.points)[2]
+        i, j = ((self.oriented.points - self.origin) / self.cell).astype(np.int64).T
+        return np.asarray(self.depth[i, j])
 
     @cached_property
     def facing(self) -> FloatArray:

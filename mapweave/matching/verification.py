@@ -137,19 +137,21 @@ def _coarse_one_way(
 ) -> FloatArray:
     """One look-up for each sample: in single precision, as the cells are coarser than that."""
     stride = 1 + (len(other.weight) - 1) // max_samples
-    weight = other.weight[::stride] * (other.weight.sum() / other.weight[::stride].sum())
-    points = other.oriented.points[::stride] / reference.cell
-    facing = _directions(other.facing[::stride])
-    samples = np.column_stack([points, facing]).astype(np.float32)
+    weight = other.weight[::stride]
+    weight = weight * (other.weight.sum() / weight.sum())
+    samples = np.empty((len(weight), 3), dtype=np.float32)
+    samples[:, :2] = other.oriented.points[::stride] / reference.cell
+    samples[:, 2] = _directions(other.facing[::stride])
     angle = transforms[:, 2].astype(np.float32)
-    shift = (transforms[:, :2] - reference.origin) / reference.cell
-    turn = angle * np.float32(DIRECTIONS / (2 * np.pi))
-    motions = np.column_stack([np.cos(angle), np.sin(angle), shift.astype(np.float32), turn])
+    motions = np.empty((len(transforms), 5), dtype=np.float32)
+    motions[:, 0], motions[:, 1] = np.cos(angle), np.sin(angle)
+    motions[:, 2:4] = (transforms[:, :2] - reference.origin) / reference.cell
+    motions[:, 4] = angle * np.float32(DIRECTIONS / (2 * np.pi))
     codes, missing = _codes(reference, p), worth_of_missing(other, p)[::stride]
     scores = np.zeros(len(transforms))
-    for each in np.unique(missing):
+    for each in sorted(set(missing.tolist())):  # two at the most
         some = missing == each
-        worth = _worth(p.min_cosine, p.contradiction_weight, float(each))
+        worth = _worth(p.min_cosine, p.contradiction_weight, each)
         scores += look_up_scores(samples[some], weight[some], motions, codes, worth, DIRECTIONS)
     return scores
 
@@ -207,7 +209,7 @@ def verify(
         common,
         contradicted,
         common / max(common + contradicted, 1e-9),
-        float(np.median(forward.distance)) if len(forward.distance) else np.inf,
+        _median(forward.distance),
         _held(other, forward.coincides),
         parameters.contradiction_weight,
     )
@@ -251,7 +253,7 @@ def coinciding(
     parameters: VerificationParameters,
 ) -> BoolArray:
     """Tell which samples (n,) of the walls of `other` are on walls of `reference`."""
-    return _one_way(reference, other, transform, parameters).coincides
+    return _judged(reference, other, transform, parameters)[0]
 
 
 def contradicting(
@@ -261,7 +263,7 @@ def contradicting(
     parameters: VerificationParameters,
 ) -> BoolArray:
     """Tell which samples (n,) of the walls of `other` lie where `reference` saw free space."""
-    return _one_way(reference, other, transform, parameters).contradicts
+    return _judged(reference, other, transform, parameters)[1]
 
 
 def _both_ways(
@@ -286,14 +288,7 @@ def _one_way(
     reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
 ) -> _OneWay:
     """Look the samples of `other` up in `reference`."""
-    coincides, through, distance = judge_samples(
-        *(other.oriented.points, other.oriented.normals, transform, reference.oriented.normals),
-        *(reference.nearest, reference.distance, reference.depth),
-        reference.origin,
-        *(reference.cell, p.closeness, p.min_cosine, p.clearance),
-    )
-    # What its own map saw through later was no wall for long: it refutes nothing.
-    contradicts = through & (other.own_depth < p.clearance)
+    coincides, contradicts, distance = _judged(reference, other, transform, p)
     return _OneWay(
         coincides,
         contradicts,
@@ -303,12 +298,32 @@ def _one_way(
     )
 
 
+def _judged(
+    reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
+) -> tuple[BoolArray, BoolArray, Float32Array]:
+    """(n,) which samples of `other` coincide, which contradict, how far they are from walls [m]."""
+    coincides, through, distance = judge_samples(
+        *(other.oriented.points, other.oriented.normals, transform, reference.oriented.normals),
+        *(reference.nearest, reference.distance, reference.depth),
+        reference.origin,
+        *(reference.cell, p.closeness, p.min_cosine, p.clearance),
+    )
+    # What its own map saw through later was no wall for long: it refutes nothing.
+    return coincides, through & (other.own_depth < p.clearance), distance
+
+
 def worth_of_missing(other: DistanceField, p: VerificationParameters) -> FloatArray:
     """(n,) what a metre of wall counts that is not there: a wall that is gone, in full."""
     if p.moved_weight == 1:
         return np.ones(len(other.weight))
     moved = free_standing(other, p.moved_gap, p.moved_side)
     return np.where(moved, p.moved_weight, 1.0)
+
+
+def _median(distance: FloatArray) -> float:
+    """[m]; infinite where there is none. What `np.median` returns, in a tenth of the time."""
+    n, ordered = len(distance), np.sort(distance)
+    return float((ordered[(n - 1) // 2] + ordered[n // 2]) / 2) if n else np.inf
 
 
 def _held(other: DistanceField, coincides: BoolArray) -> float:

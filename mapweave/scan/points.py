@@ -122,7 +122,7 @@ def points_on_lines(lines: LineMap, spacing: float) -> tuple[OrientedPoints, Int
     lengths = np.hypot(directions[:, 0], directions[:, 1])
     counts = np.maximum(1, np.round(lengths / spacing)).astype(np.int64)
     owner = np.repeat(np.arange(len(segments)), counts)
-    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    rank = np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
     fraction = (rank + 0.5) / counts[owner]
     points = segments[owner, :2] + fraction[:, None] * directions[owner]
     return OrientedPoints(points, left_normals(directions)[owner], lines.polyline[owner]), owner

@@ -9,6 +9,7 @@ many pairs it is in and however many scans saw it. A plain rectangle, driven thr
 four ends; ten metres of a laboratory's wall with hooks and niches have ten.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -177,15 +178,20 @@ def rarity(shared: WallEnds, shares: Shares, own: Counts, parameters: RarityPara
 
 
 def _least_tree(cost: FloatArray) -> float:
-    """Return the cost of the cheapest trees that hold together what (n, n) `cost` can."""
+    """Return the cost of the cheapest trees that hold together what (n, n) `cost` can.
+
+    What is in `cost` is lost.
+    """
     total, left = 0.0, np.full(len(cost), np.inf)
     waiting = np.ones(len(cost), dtype=np.bool_)
     for _ in range(len(cost)):
-        k = int(np.where(waiting, left, np.inf).argmin()) if waiting.any() else 0
-        if not np.isfinite(left[k]) or not waiting[k]:
+        k = int(left.argmin())
+        least = float(left[k])
+        if math.isfinite(least):
+            total += least
+        else:
             k = int(waiting.argmax())  # the first of another group: it is told by nothing
-            left[k] = 0.0
-        total += float(left[k])
         waiting[k] = False
-        left = np.minimum(left, cost[k])
+        cost[:, k] = left[k] = np.inf  # what is in a tree is not asked for again
+        np.minimum(left, cost[k], out=left)
     return total

@@ -172,7 +172,9 @@ def test_where_words_are_many_the_rarest_are_looked_at(make: type) -> None:
     assert found[0].tolist() == [20]
 
 
-def a_raster(rng: np.random.Generator, walls: int) -> tuple[Codes, FloatArray, float, FloatArray]:
+def a_raster(
+    rng: np.random.Generator, walls: int, metres: float = 1.0
+) -> tuple[Codes, FloatArray, float, FloatArray]:
     """Return codes, origin, cell and samples of a map of 32 directions."""
     shape = rng.integers(1, 40, 2)
     codes = rng.integers(0, 34, shape).astype(np.uint8)
@@ -183,22 +185,31 @@ def a_raster(rng: np.random.Generator, walls: int) -> tuple[Codes, FloatArray, f
         codes,
         origin,
         0.2,
-        np.column_stack([places, rng.random(walls), rng.uniform(0, 1, walls)]),
+        np.column_stack([places, rng.random(walls), rng.uniform(0, metres, walls)]),
     )
 
 
 @compiled
 @settings(max_examples=30, deadline=None)
-@given(seeds, st.sampled_from([0, 1, 40]), st.sampled_from([0, 3, 1000]))
-def test_shifts_count_the_same(seed: int, walls: int, count: int) -> None:
+@given(seeds, st.sampled_from([0, 1, 40]), st.sampled_from([0, 3, 1000]), st.sampled_from([1, 30]))
+def test_shifts_count_the_same(seed: int, walls: int, count: int, metres: float) -> None:
+    """However many metres a sample stands for: sums of sixteen bits hold some 40 m."""
     assert COMPILED is not None
     rng = np.random.default_rng(seed)
-    maps = [a_raster(rng, n) for n in (walls, 40)]
+    maps = [a_raster(rng, n, metres) for n in (walls, 40)]
     asked = rng.uniform(-np.pi, np.pi, 3), 0.4, 32, 5, count
     ours = COMPILED.best_shifts(*(COMPILED.PlaceView(*m) for m in maps), *asked)
     theirs = best_shifts_numpy(PlaceViewNumpy(*maps[0]), PlaceViewNumpy(*maps[1]), *asked)
     for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-9, rtol=1e-9)
+
+
+@compiled
+def test_cells_too_wide_for_their_sums_are_refused() -> None:
+    assert COMPILED is not None
+    view = COMPILED.PlaceView(*a_raster(np.random.default_rng(1), 1))
+    with pytest.raises(ValueError, match="fewer cells"):
+        COMPILED.best_shifts(view, view, np.zeros(1), 30.0, 32, 1, 1)
 
 
 @compiled
