@@ -23,7 +23,7 @@ from mapweave.fusion.parameters import FusionParameters, chosen
 from mapweave.fusion.places import compare_at_places, is_one_place, located
 from mapweave.fusion.ranking import Fields, find_alignments, rated
 from mapweave.fusion.rivals import without_its_room
-from mapweave.fusion.rooms import outside
+from mapweave.fusion.rooms import outside, rooms_of
 from mapweave.fusion.wings import unless_one_kind
 from mapweave.geometry import se2
 from mapweave.geometry.arguments import check_kind
@@ -282,8 +282,9 @@ def _decided(
     sure = confidence(best.verdict, rival.verdict if rival else None, p.confidence)
     decision, cause = decide(best, rival, sure, p.decision)
     if decision != "refused":
-        best = rated(best, first, second, p)
-        rival = rival and rated(rival, first, second, p)
+        words = first.words.plus(second.words)
+        best = rated(best, first, second, words, p)
+        rival = rival and rated(rival, first, second, words, p)
         decision, sure, cause = _whichever_room(best, rival, (first.raster, second.raster), p)
     if decision == "refused" or cause.kind is ReasonKind.RIVAL:
         sure = min(sure, p.rooms.unique)
@@ -295,10 +296,11 @@ def _whichever_room(
     best: Hypothesis, rival: Hypothesis | None, fields: Fields, p: FusionParameters
 ) -> tuple[Decision, float, Reason]:
     """Decide about what is not refused, how sure it is, and why: rooms may exist twice."""
-    beyond = outside(*fields, best.transform, p.verification, p.rooms)
+    rooms = rooms_of(fields[0], p.rooms), rooms_of(fields[1], p.rooms)
+    beyond = outside(*fields, best.transform, p.verification, p.rooms, rooms)
     one_room = beyond < p.rooms.min_outside
     asked = p.verification, p.rooms, p.wings.crossings
-    counted = without_its_room(best, rival, beyond, fields, *asked)
+    counted = without_its_room(best, rival, beyond, fields, rooms, *asked)
     against = counted.verdict if counted else None
     sure = confidence(best.verdict, against, p.confidence, best.rarity or 0.0)
     sure *= p.rooms.unique if one_room else 1.0

@@ -17,7 +17,7 @@ from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.hypotheses import PreparedMap, different, hypothesise
 from mapweave.matching.icp import Target, align_all
 from mapweave.matching.verification import shared_complexity, verify
-from mapweave.shape.background import shares_without
+from mapweave.shape.background import Counts, shares_without
 from mapweave.shape.rarity import rarity, shared_ends
 
 Fields = tuple[DistanceField, DistanceField]  # judged by: of the reference, and of the other
@@ -54,13 +54,23 @@ def _ranked(
 
 
 def rated(
-    hypothesis: Hypothesis, first: PreparedMap, second: PreparedMap, p: FusionParameters
+    hypothesis: Hypothesis,
+    first: PreparedMap,
+    second: PreparedMap,
+    words: Counts,
+    p: FusionParameters,
 ) -> Hypothesis:
-    """Return `hypothesis` with how rare it is that two places have what both maps have (H1)."""
+    """Return `hypothesis` with how rare it is that two places have what both maps have (H1).
+
+    Parameters
+    ----------
+    words
+        Of both maps together.
+    """
     asked = p.hypotheses.rarity
     shared = shared_ends(first.ends, second.ends, hypothesis.transform, asked)
     shares = shares_without(asked.left_out, asked.bins)
-    bits = rarity(shared, shares, first.words.plus(second.words), asked)
+    bits = rarity(shared, shares, words, asked)
     return replace(hypothesis, rarity=bits)
 
 

@@ -7,7 +7,7 @@ the best explains much more than a room: then the room is what exists twice.
 from dataclasses import replace
 
 from mapweave.fusion.decision import Hypothesis
-from mapweave.fusion.rooms import RoomParameters, outside
+from mapweave.fusion.rooms import RoomParameters, Rooms, outside
 from mapweave.matching.crossings import CrossingParameters, crossed
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.verification import VerificationParameters
@@ -18,6 +18,7 @@ def without_its_room(
     rival: Hypothesis | None,
     beyond: float,
     fields: tuple[DistanceField, DistanceField],
+    rooms: tuple[Rooms, Rooms],
     verification: VerificationParameters,
     p: RoomParameters,
     crossings: CrossingParameters,
@@ -31,14 +32,14 @@ def without_its_room(
     ----------
     beyond
         [m] of wall that `best` has in common, one room left out.
-    fields
+    fields, rooms
         Of the reference, and of the other map.
     """
     if rival is None or best.verdict.overlap < p.clean:
         return rival
     if min(beyond, best.verdict.score) < p.of_rival * rival.verdict.score:
         return rival
-    little = outside(*fields, rival.transform, verification, p)
+    little = outside(*fields, rival.transform, verification, p, rooms)
     if little >= p.min_outside:
         return rival
     if crossed(*fields, best.transform, verification, crossings) >= crossings.door:

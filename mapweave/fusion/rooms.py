@@ -7,6 +7,7 @@ plain corridor before it does not: it fits before every door.
 
 import math
 from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -61,12 +62,28 @@ class RoomParameters(BaseModel):
     )
 
 
+class Rooms(NamedTuple):
+    """What the free space of a map falls apart into where passages are closed.
+
+    Attributes
+    ----------
+    nearest
+        (rows, columns) the number of the room nearest to each coarse cell.
+    extents
+        (k,) the longer side of each, by how far it spreads [m].
+    """
+
+    nearest: IntArray
+    extents: FloatArray
+
+
 def outside(
     reference: DistanceField,
     other: DistanceField,
     transform: FloatArray,
     verification: VerificationParameters,
     parameters: RoomParameters,
+    rooms: tuple[Rooms, Rooms] | None = None,
 ) -> float:
     """Return the metres of wall in common that tell the place when one room is left out.
 
@@ -83,11 +100,14 @@ def outside(
         (3,) from `other` to `reference` [m, m, rad].
     verification, parameters
         When walls coincide, and what a room is.
+    rooms
+        Of the two maps, where they were told before.
     """
     p, back = parameters, se2.inverse(transform)
+    ours, theirs = rooms or (rooms_of(reference, p), rooms_of(other, p))
     both = (
-        _outside(reference, other, transform, verification, p),
-        _outside(other, reference, back, verification, p),
+        _outside(ours, reference, other, transform, verification, p),
+        _outside(theirs, other, reference, back, verification, p),
     )
     told = [metres for metres in both if metres is not None]
     if not told:
@@ -99,14 +119,15 @@ def outside(
 
 
 def _outside(
+    rooms: Rooms,
     reference: DistanceField,
     other: DistanceField,
     transform: FloatArray,
     verification: VerificationParameters,
     p: RoomParameters,
 ) -> float | None:
-    """Count by the rooms of `reference`; None where it tells of none."""
-    nearest, extents = _rooms(reference, p)
+    """Count by the `rooms` of `reference`; None where it tells of none."""
+    nearest, extents = rooms
     if len(extents) == 0:
         return None
     shared = coinciding(reference, other, transform, verification)
@@ -131,12 +152,8 @@ def _telling(normals: FloatArray, weight: FloatArray, p: RoomParameters) -> floa
     return float(min(weight.sum(), p.one_way * max(held, 0.0)))
 
 
-def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArray]:
-    """Return (rows, columns) the number of the room nearest to each coarse cell; (k,) extents [m].
-
-    Rooms are what free space falls apart into where passages are closed that are no wider than a
-    door; an extent is the longer side of one, by how far it spreads.
-    """
+def rooms_of(raster: DistanceField, p: RoomParameters) -> Rooms:
+    """Return the rooms of a map: passages are closed that are no wider than a door."""
     rows, columns = (n // p.coarse for n in raster.depth.shape)
     cut, step = raster.depth[: rows * p.coarse, : columns * p.coarse], range(p.coarse)
     parts = [cut[i :: p.coarse, j :: p.coarse] for i in step for j in step]
@@ -144,8 +161,8 @@ def _rooms(raster: DistanceField, p: RoomParameters) -> tuple[IntArray, FloatArr
     label, nearest = nearest_parts(depth > p.passage)
     count = int(label.max(initial=0))
     if count == 0:
-        return np.zeros((rows, columns), dtype=np.int64), np.empty(0)
-    return nearest - 1, _extents(label, count) * p.coarse * raster.cell + 2 * p.passage
+        return Rooms(np.zeros((rows, columns), dtype=np.int64), np.empty(0))
+    return Rooms(nearest - 1, _extents(label, count) * p.coarse * raster.cell + 2 * p.passage)
 
 
 def _extents(label: IntArray, count: int) -> FloatArray:
