@@ -42,7 +42,7 @@ def test_beams_that_a_pane_swallows_end_at_it_and_not_beyond() -> None:
         np.testing.assert_array_equal(filled.ranges[~lost], short.ranges[~lost])
         off = scan.ranges[lost] - filled.ranges[lost]
         found = np.isfinite(off)
-        ended += np.count_nonzero(found)
+        ended += int(np.count_nonzero(found))
         assert (off[found] > -P.cell).all() and np.median(off[found]) < P.spread
     assert ended > 0.9 * sum(np.isnan(short.ranges).sum() for short in paned)
 
