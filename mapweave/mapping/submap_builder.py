@@ -29,6 +29,7 @@ from mapweave.mapping.change_detection import (
 from mapweave.mapping.tracking.pose_covariance import EXACT
 from mapweave.maps import LineMap, Trajectory
 from mapweave.parameters import StageParameters, derived
+from mapweave.scan.faint_surfaces import FaintSurfaceParameters, up_to_faint_surfaces
 from mapweave.scan.free_space import FreeSpaceParameters, rings, seen_free
 from mapweave.scan.scan import Scan
 from mapweave.scan.visibility import sights_of
@@ -55,6 +56,7 @@ class SubmapParameters(StageParameters):
     )
     merging: MergingParameters = derived(MergingParameters.of)
     free_space: FreeSpaceParameters = derived(FreeSpaceParameters.of)
+    faint: FaintSurfaceParameters = derived(FaintSurfaceParameters.of)
     change_detection: ChangeDetectionParameters = derived(ChangeDetectionParameters.of)
     slivers: SliverParameters = derived(SliverParameters.of)
     # Poses err less here than among submaps; and what is little here may be much together.
@@ -244,7 +246,8 @@ class SubmapBuilder:
         """Return what was seen through so far."""
         p, places = self._parameters.free_space, self._viewpoints
         poses = np.array([w.pose for w in places]).reshape(-1, 3)
-        return seen_free(sights_of([w.scan for w in places], poses, p.sight), p)
+        scans = up_to_faint_surfaces([w.scan for w in places], poses, self._parameters.faint)
+        return seen_free(sights_of(scans, poses, p.sight), p)
 
     def lines(self) -> LineMap:
         """Return the lines alone, not simplified: fast enough for every scan."""

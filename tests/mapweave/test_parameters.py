@@ -50,6 +50,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "DistanceFieldParameters": {"cell": 0.1, "spacing": 0.2},
     "DriftParameters": {"shift": 0.5, "reach": 0.15, "forgotten": 0.05},
     "EncounterParameters": {},
+    "FaintSurfaceParameters": {"sight": 10.0, "cell": 0.05},
     "FftCorrelationParameters": {"clearance": 0.5},
     "FittingParameters": {"tolerance": 0.09, "max_hole": 0.3},
     "FragmentParameters": {},

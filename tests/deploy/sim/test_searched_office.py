@@ -11,7 +11,7 @@ from mapweave.maps import LineMap
 from mapweave.scan.coverage import coverage
 from mapweave.scan.free_space import FreeSpaceParameters, rings, unite
 from mapweave.scan.scan import Scan
-from mapweave_deploy.sim.office import GLASS, ROOMS, Room, office
+from mapweave_deploy.sim.office import ROOMS, Room, office
 from mapweave_deploy.sim.sweeps import SweepParameters, sweeps
 from mapweave_deploy.sim.trajectories import TourParameters, tour_through
 from mapweave_deploy.sim.world import World
@@ -25,7 +25,6 @@ WITH_ONE_DOOR = [
 ]
 SEEDS = range(1, 4)
 ROUNDS = 4  # of driving where the search goes on
-AT_A_WINDOW = 2.0  # [m]: what lies before it is seen only by beams that go to other walls
 
 
 def searched(seed: int, *left_out: Room) -> list[FloatArray]:
@@ -91,24 +90,19 @@ def nearest_first(stops: FloatArray) -> FloatArray:
     return stops[order]
 
 
-def but_at_windows(found: list[FloatArray]) -> list[shapely.LineString]:
-    """Return what of frontiers is not before glass: from it nothing comes back."""
-    lines = [shapely.LineString(frontier) for frontier in found]
-    return [line for line in lines if shapely.distance(line, GLASS) > AT_A_WINDOW]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_robot_that_drives_where_the_search_goes_on_leaves_nothing_but_windows(seed: int) -> None:
+def test_a_robot_that_drives_where_the_search_goes_on_leaves_nothing(seed: int) -> None:
+    """Windows among it: of a pane little comes back, but some does."""
     world = office(seed)
     stops = nearest_first(world.stops)
     for _ in range(ROUNDS):
         found = left(world, stops)
-        if not but_at_windows(found):
+        if not found:
             break
         to_see = [frontier.mean(axis=0) for frontier in found]
         stops = np.vstack([stops, nearest_first(np.array([stops[-1], *to_see]))])
-    assert but_at_windows(found) == []
+    assert found == []
 
 
 @pytest.mark.slow
@@ -118,5 +112,5 @@ def test_the_search_goes_on_most_where_a_robot_drove_past_a_room(seed: int) -> N
     world = office(seed)
     room = WITH_ONE_DOOR[3]
     elsewhere = ~shapely.contains_xy(room.inside, *world.stops.T)
-    [longest, *_] = but_at_windows(left(world, nearest_first(world.stops[elsewhere])))
-    assert shapely.contains(room.inside.buffer(0.5), longest)
+    [longest, *_] = left(world, nearest_first(world.stops[elsewhere]))
+    assert shapely.contains(room.inside.buffer(0.5), shapely.LineString(longest))
