@@ -13,12 +13,10 @@ from typing import TypeAlias
 
 from mapweave.maps import Alignment, RobotMap
 from mapweave_agent.comparison_schedule import Comparison
-from mapweave_agent.worker import Worker, answer
+from mapweave_agent.worker import LAST, Worker, answer
 from mapweave_protocol.wire.pairs import told_apart
 
 Aligner: TypeAlias = Callable[[RobotMap, RobotMap], Sequence[Alignment]]
-
-NICENESS = 19  # all else comes first where processors are few: mapping, versions
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +89,8 @@ class ComparisonWorker(Worker):
 
 def _serve(pipe: Connection, align: Aligner) -> None:
     """Compare what comes through `pipe` until its other end is closed."""
-    answer(pipe, NICENESS, lambda maps: _compare(align, *maps))
+    # All else comes first where processors are few: mapping, versions.
+    answer(pipe, LAST, lambda maps: _compare(align, *maps))
 
 
 def _compare(

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from multiprocessing import resource_tracker
@@ -10,6 +11,7 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any, Self
 
+LAST = 19  # the greatest niceness
 _SPAWN = multiprocessing.get_context("spawn")  # a forked Zenoh session hangs
 
 
@@ -63,16 +65,29 @@ class Worker:
 
 
 def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None:
-    """Answer what comes through `pipe`, by `of`, until its other end is closed."""
+    """Answer what comes through `pipe`, by `of`, until its other end is closed.
+
+    Parameters
+    ----------
+    niceness
+        How much nicer this process is than the agent; the nicest there are, `LAST`, run where
+        nothing else would, so that they give way to agents that are as nice themselves.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the agent ends this process itself
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    os.nice(niceness)
+    _give_way(niceness)
     while True:
         try:
             asked = pipe.recv()
         except EOFError:
             return
         pipe.send(of(asked))
+
+
+def _give_way(niceness: int) -> None:
+    os.nice(niceness)
+    if niceness >= LAST and sys.platform == "linux":
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
 def _end_with_parent() -> None:

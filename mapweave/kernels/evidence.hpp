@@ -24,6 +24,20 @@ struct Line {
   }
 };
 
+// A point near a segment: where it lies along and across it, and how far past its ends [m].
+struct Near {
+  int64_t segment, point;
+  double along, across, beyond;
+};
+
+// One number of each pair, in their order.
+template <typename T, typename F>
+Out<T> column(const std::vector<Near>& pairs, F&& of) {
+  std::vector<T> values(pairs.size());
+  std::transform(pairs.begin(), pairs.end(), values.begin(), of);
+  return give(std::move(values), {pairs.size()});
+}
+
 inline auto near_pairs(In<double, 2> segments, In<double, 2> points, In<double, 2> directions, double reach) {
   const size_t n = segments.shape(0), m = points.shape(0);
   if (segments.shape(1) != 4 || points.shape(1) != 2 || directions.shape(1) != 2 || directions.shape(0) != m)
@@ -31,33 +45,37 @@ inline auto near_pairs(In<double, 2> segments, In<double, 2> points, In<double, 
   if (!(reach > 0)) throw std::invalid_argument("reach: above 0 expected");
   for (size_t i = 0; i < 4 * n; ++i)
     if (!std::isfinite(segments.data()[i])) throw std::invalid_argument("segments: finite numbers expected");
-  const Grid grid(points.data(), m, std::max(reach, 0.1));
-  std::vector<int64_t> segment, sample, found;
-  std::vector<double> along, across, distance, cosine;
+  const double *place = points.data(), *direction = directions.data();
+  const Grid grid(place, m, std::max(reach, 0.1));
+  std::vector<Near> pairs;
+  std::vector<Line> lines;
+  lines.reserve(n);
   for (size_t k = 0; k < n; ++k) {
     const double* s = segments.data() + 4 * k;
-    const Line line(s);
-    found.clear();
+    const Line& line = lines.emplace_back(s);
+    const size_t begin = pairs.size();
     grid.along(s, reach, [&](int64_t i) {
-      const double dx = points.data()[2 * i] - line.x, dy = points.data()[2 * i + 1] - line.y;
+      const double dx = place[2 * i] - line.x, dy = place[2 * i + 1] - line.y;
       const double a = line.u * dx + line.v * dy, c = line.u * dy - line.v * dx;
       const double beyond = line.beyond(dx, dy, a);
-      if (c * c + beyond * beyond <= reach * reach) found.push_back(i);
+      if (c * c + beyond * beyond <= reach * reach) pairs.push_back({static_cast<int64_t>(k), i, a, c, beyond});
     });
-    std::sort(found.begin(), found.end());
-    for (const int64_t i : found) {
-      const double dx = points.data()[2 * i] - line.x, dy = points.data()[2 * i + 1] - line.y;
-      const double a = line.u * dx + line.v * dy, c = line.u * dy - line.v * dx;
-      const double beyond = line.beyond(dx, dy, a);
-      segment.push_back(static_cast<int64_t>(k)), sample.push_back(i);
-      along.push_back(a), across.push_back(c), distance.push_back(std::hypot(c, beyond));
-      cosine.push_back(line.u * directions.data()[2 * i] + line.v * directions.data()[2 * i + 1]);
-    }
+    std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(begin), pairs.end(),
+              [](const Near& one, const Near& other) { return one.point < other.point; });
   }
-  const size_t count = segment.size();
-  return std::make_tuple(give(std::move(segment), {count}), give(std::move(sample), {count}),
-                        give(std::move(along), {count}), give(std::move(across), {count}),
-                        give(std::move(distance), {count}), give(std::move(cosine), {count}));
+  const auto distance = [](const Near& p) {
+    return p.beyond > 0 ? std::hypot(p.across, p.beyond) : std::abs(p.across);
+  };
+  const auto cosine = [&](const Near& p) {
+    const Line& line = lines[static_cast<size_t>(p.segment)];
+    return line.u * direction[2 * p.point] + line.v * direction[2 * p.point + 1];
+  };
+  return std::make_tuple(
+      column<int64_t>(pairs, [](const Near& p) { return p.segment; }),
+      column<int64_t>(pairs, [](const Near& p) { return p.point; }),
+      column<double>(pairs, [](const Near& p) { return p.along; }),
+      column<double>(pairs, [](const Near& p) { return p.across; }), column<double>(pairs, distance),
+      column<double>(pairs, cosine));
 }
 
 // Pairs by one of their two ends: which pairs the k-th has.
@@ -123,9 +141,11 @@ inline auto gather(In<double, 2> points, In<double, 2> directions, In<double, 1>
   };
   std::vector<Key> keys(n);
   constexpr double kTurn = 6.283185307179586476925286766559;
+  int64_t bin = 0;
   for (size_t k = 0; k < n; ++k) {
     const double *p = points.data() + 2 * k, *d = directions.data() + 2 * k;
-    const int64_t bin = static_cast<int64_t>(std::floor(std::atan2(d[1], d[0]) / kTurn * static_cast<double>(bins)));
+    if (k == 0 || d[0] != d[-2] || d[1] != d[-1])  // not again for each sample of one sighting
+      bin = static_cast<int64_t>(std::floor(std::atan2(d[1], d[0]) / kTurn * static_cast<double>(bins)));
     keys[k] = {static_cast<int64_t>(std::floor(p[0] / cell)), static_cast<int64_t>(std::floor(p[1] / cell)),
                ((bin % bins) + bins) % bins, k};
   }

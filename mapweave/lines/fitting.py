@@ -119,18 +119,23 @@ def cut(
     p = parameters
     near = Nearness.of(segments, evidence.points, evidence.directions, p.shadow)
     same = _same_face(near, segments, 0.0, p)
-    place_along = np.floor(near.along / p.station).astype(np.int64)
-    width = int(place_along.max(initial=0)) + 2
-    key = (near.segment * width + place_along)[same]
+    first = _first_stations(segments, p)
+    place = (first[near.segment] + np.floor(near.along / p.station).astype(np.int64))[same]
     on = np.abs(near.across[same]) <= p.tolerance
     weight = evidence.weights[near.sample[same]]
-    keys, place = np.unique(key, return_inverse=True)
-    balance = np.bincount(place, np.where(on, weight, -weight), minlength=len(keys))
-    shown = np.bincount(place, np.where(on, weight, 0.0), minlength=len(keys)).astype(np.float64)
+    balance = np.bincount(place, np.where(on, weight, -weight), minlength=first[-1])
+    shown = np.bincount(place, np.where(on, weight, 0.0), minlength=first[-1]).astype(np.float64)
     found = np.flatnonzero(balance > 0)
-    segment, station = keys[found] // width, keys[found] % width
+    segment = np.searchsorted(first, found, side="right") - 1
+    station = found - first[segment]
     wall = ~_is_opening(segments, segment, station, shown[found], free, p)
     return _runs(segments, segment[wall], station[wall], p)
+
+
+def _first_stations(segments: FloatArray, p: FittingParameters) -> IntArray:
+    """(n + 1,) the number of the first station of each of (n, 4) `segments`, and of all."""
+    counts = np.floor(units(segments)[1] / p.station).astype(np.int64) + 1
+    return np.concatenate([[0], np.cumsum(counts)])
 
 
 def trim(

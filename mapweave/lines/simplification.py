@@ -108,9 +108,11 @@ def sources(
     near = Nearness.of(segments, points, directions, p.placement.tolerance)
     along = np.flatnonzero(near.cosine >= np.cos(p.placement.parallel))
     segment, source = near.segment[along], owner[near.sample[along]]
-    keys, place = np.unique(segment * len(sightings) + source, return_inverse=True)
-    shared = np.bincount(place, lengths[near.sample[along]], minlength=len(keys))
-    segment, source = np.divmod(keys, max(len(sightings), 1))
+    # Pairs come by segment, and then by sample: those of one sighting follow each other.
+    begins = np.append(True, (np.diff(segment) > 0) | (np.diff(source) > 0))[: len(segment)]
+    place = np.cumsum(begins) - 1
+    segment, source = segment[begins], source[begins]
+    shared = np.bincount(place, lengths[near.sample[along]], minlength=len(segment))
     _, wall = units(segments)
     _, seen = units(sightings)
     enough = shared >= np.minimum(wall[segment], seen[source]) / 2

@@ -7,6 +7,7 @@ import time
 from functools import partial
 
 import numpy as np
+import pytest
 
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
@@ -44,6 +45,14 @@ def test_what_comes_back_is_what_the_function_returns() -> None:
     assert outcome.alignments is not None
     (alignment,) = outcome.alignments
     assert (alignment.decision, alignment.reason) == (expected.decision, expected.reason)
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="schedulers as Linux has them")
+def test_maps_are_compared_where_nothing_else_would_run() -> None:
+    with ComparisonWorker(align) as comparer:
+        comparer.start(COMPARISON)
+        outcome_of(comparer)
+        assert os.sched_getscheduler(comparer.pid) == os.SCHED_IDLE
 
 
 def test_a_function_takes_its_parameters_along() -> None:

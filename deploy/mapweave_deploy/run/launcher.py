@@ -30,7 +30,7 @@ from mapweave_protocol.wire.messages import JointMapMessage, MapMessage
 ROUTER, SERVER, AGENT = 0, 1, 2  # stages: agents are stopped first, the router last
 ROUTER_PATIENCE = 20.0  # [s] for the router to listen, on a machine that is busy starting things
 PAGE_PATIENCE = 60.0  # [s] for the coordinator to serve its page, while agents start as well
-AGENT_NICENESS = 12  # of agents, beside a router and a coordinator on the same machine
+AGENT_NICENESS = 19  # of agents, beside a router and a coordinator on the same machine
 
 
 class NoJointMapError(MapweaveError):

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import FloatArray, IntArray
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.parameters import StageParameters, derived
-from mapweave.scan.points import OrientedPoints, points_on_lines
+from mapweave.scan.points import points_on_lines
 
 
 class SegmentConfidenceParameters(StageParameters):
@@ -84,9 +84,9 @@ def segment_confidence(
         near = np.zeros(len(oriented), dtype=np.bool_)
         through = near.copy()
         for witness, pose in pieces:
-            said = _heard(witness, pose, oriented)
-            near |= said == CONFIRMS
-            through |= said == DENIES
+            known, said = _heard(witness, pose, oriented.points)
+            near[known] |= said == CONFIRMS
+            through[known] |= said == DENIES
         confirm += near
         deny += through & ~near
     # What nobody confirms at this very place was merged from walls close by: one voice for it.
@@ -95,13 +95,17 @@ def segment_confidence(
     return np.asarray(lines.support / (lines.support + 1.0) * agreed)
 
 
-def _heard(witness: Witness, pose: FloatArray, oriented: OrientedPoints) -> NDArray[np.uint8]:
-    """Return (n,) what a piece at `pose` says of each sample."""
-    points = se2.transform_points(se2.inverse(pose), oriented.points)
-    index = (points - witness.origin) / witness.cell
+def _heard(
+    witness: Witness, pose: FloatArray, points: FloatArray
+) -> tuple[IntArray, NDArray[np.uint8]]:
+    """Return which of (n, 2) `points` a piece at `pose` knows of, and what it says of each."""
+    size = np.array(witness.said.shape) * witness.cell
+    x, y = se2.transform_points(pose, witness.origin + size / 2).tolist()
+    reach = np.hypot(*size) / 2 + witness.cell
+    near = np.flatnonzero((np.abs(points[:, 0] - x) <= reach) & (np.abs(points[:, 1] - y) <= reach))
+    index = (se2.transform_points(se2.inverse(pose), points[near]) - witness.origin) / witness.cell
     rows, columns = witness.said.shape
     i, j = index[:, 0], index[:, 1]
     inside = np.flatnonzero((i >= 0) & (j >= 0) & (i < rows) & (j < columns))
-    heard = np.full(len(oriented), SILENT, dtype=np.uint8)
-    heard[inside] = witness.said[i[inside].astype(np.int64), j[inside].astype(np.int64)]
-    return heard
+    said = witness.said[i[inside].astype(np.int64), j[inside].astype(np.int64)]
+    return near[inside], said
