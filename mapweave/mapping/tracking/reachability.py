@@ -5,8 +5,8 @@ between two scans is what their stamps say, or what so many scans usually take, 
 Where stamps tell no time at all, nothing is bound here, and the pace of the robot has to do:
 `MotionModel.reach`.
 
-How fast robots are is not always known. Where nobody set it, one that what it saw held to more than
-is usual for a while is bound by what it did instead: it goes on as fast.
+How fast robots are is not always known. One that what it saw held to more than its speed for a
+while is bound by what it did instead: it goes on as fast.
 """
 
 import math
@@ -18,7 +18,6 @@ from typing import NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from mapweave.config import Robot
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.parameters import StageParameters, derived
@@ -30,11 +29,8 @@ class ReachabilityParameters(StageParameters):
 
     max_speed: float = derived(lambda c: c.robot.max_speed, gt=0, description="[m/s]")
     max_turn_rate: float = derived(lambda c: c.robot.max_turn_rate, gt=0, description="[rad/s]")
-    faster: float = derived(
-        lambda c: 1.5 if c.robot.max_speed == Robot().max_speed else 1.0,
-        ge=1,
-        description="times its speed, that a robot may turn out to drive at the most: none whose"
-        " speed was set, as who sets it knows it",
+    faster: float = Field(
+        1.5, ge=1, description="times its speed, that a robot may turn out to drive at the most"
     )
     slack: float = derived(
         lambda c: c.mapping.closeness, gt=0, description="[m] more, as poses err"

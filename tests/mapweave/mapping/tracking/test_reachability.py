@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mapweave.config import Config, Robot
 from mapweave.geometry import se2
 from mapweave.mapping.tracking.reachability import Reachability, ReachabilityParameters
 from mapweave.scan.scan import Scan
@@ -76,13 +75,6 @@ def test_no_robot_goes_faster_without_end() -> None:
     """Nor is one that leaps from pose to pose taken for fast: half as much again is the most."""
     known, now = after([0.1 * k for k in range(32)], step=0.4, held=1)
     assert not known.allows(now, np.array([[0.4 * 31, 0.0, 0.0]]))[0]
-
-
-def test_a_speed_that_was_set_is_kept_to() -> None:
-    """Who sets it knows it: whatever a robot seems to have done, it did no more."""
-    unset, slow = Config(), Config(robot=Robot(max_speed=1.0))
-    assert ReachabilityParameters.of(unset).faster > 1
-    assert ReachabilityParameters.of(slow).faster == 1
 
 
 def test_two_held_poses_a_moment_apart_tell_no_speed() -> None:
