@@ -160,7 +160,7 @@ class Robot(_Checked):
     """How the robot moves."""
 
     max_speed: Annotated[float, Unit("m/s")] = Field(
-        2.0, ge=0.01, le=20, description="it drives no faster, unless what it saw holds it to more"
+        2.0, ge=0.01, le=20, description="it drives no faster"
     )
     max_turn_rate: Annotated[float, Unit("rad/s")] = Field(
         math.pi, ge=0.01, le=20, description="it turns no faster"

@@ -4,9 +4,6 @@ Stamps are evidence of their own: they jitter, come in batches, repeat and run b
 between two scans is what their stamps say, or what so many scans usually take, whichever is more.
 Where stamps tell no time at all, nothing is bound here, and the pace of the robot has to do:
 `MotionModel.reach`.
-
-How fast robots are is not always known. One that what it saw held to more than its speed for a
-while is bound by what it did instead: it goes on as fast.
 """
 
 import math
@@ -29,9 +26,6 @@ class ReachabilityParameters(StageParameters):
 
     max_speed: float = derived(lambda c: c.robot.max_speed, gt=0, description="[m/s]")
     max_turn_rate: float = derived(lambda c: c.robot.max_turn_rate, gt=0, description="[rad/s]")
-    faster: float = Field(
-        1.5, ge=1, description="times its speed, that a robot may turn out to drive at the most"
-    )
     slack: float = derived(
         lambda c: c.mapping.closeness, gt=0, description="[m] more, as poses err"
     )
@@ -50,7 +44,6 @@ class _Stay(NamedTuple):
     number: int
     stamp: float
     pose: FloatArray
-    held: bool = False
 
 
 class Reachability:
@@ -91,15 +84,9 @@ class Reachability:
             self._interval = usual if usual > 0 else None
         self._last = scan.index, scan.stamp
 
-    def placed(self, scan: Scan, pose: FloatArray, *, held: bool = False) -> None:
-        """Note that `scan` was taken at `pose` (3,); what lies longer ago is let go.
-
-        Parameters
-        ----------
-        held
-            Whether what it saw holds it there in every direction.
-        """
-        self._way.append(_Stay(scan.index, scan.stamp, pose, held))
+    def placed(self, scan: Scan, pose: FloatArray) -> None:
+        """Note that `scan` was taken at `pose` (3,); what lies longer ago is let go."""
+        self._way.append(_Stay(scan.index, scan.stamp, pose))
         while len(self._way) > 1 and self._time(self._way[1], scan) >= self._p.window:
             self._way.popleft()
 
@@ -138,29 +125,12 @@ class Reachability:
         time = np.array([self._time(stay, scan) for stay in way])
         apart = np.abs(poses[:, None] - np.array([stay.pose for stay in way]))
         turned = np.abs(se2.wrap(apart[..., 2]))
-        near = np.hypot(apart[..., 0], apart[..., 1]) <= p.slack + self._speed * time
+        near = np.hypot(apart[..., 0], apart[..., 1]) <= p.slack + p.max_speed * time
         possible = near & (turned <= p.turn_slack + p.max_turn_rate * time)
         return np.asarray(possible.all(axis=1))
 
-    @property
-    def _speed(self) -> float:
-        """[m/s] that it drives at the most; what it was held to for long enough, if that is more.
-
-        From one held pose to another: what is between them may lie anywhere along a corridor.
-        """
-        p, held = self._p, [stay for stay in self._way if stay.held]
-        time = self._between(held[0], held[-1]) if held else 0.0
-        if time < p.window / 2:
-            return p.max_speed
-        shown = float(np.hypot(*(held[-1].pose - held[0].pose)[:2])) / time
-        return min(max(p.max_speed, shown), p.faster * p.max_speed)
-
     def _time(self, stay: _Stay, scan: Scan) -> float:
-        """[s] between a stay and a scan, the longest that there is evidence for."""
-        return self._between(stay, _Stay(scan.index, scan.stamp, se2.IDENTITY))
-
-    def _between(self, first: _Stay, second: _Stay) -> float:
-        """[s] between two stays, likewise."""
-        counted = max(abs(second.number - first.number), 1) * (self.interval or 0.0)
-        told = abs(second.stamp - first.stamp)
+        """[s] between two scans, the longest that there is evidence for."""
+        counted = max(abs(scan.index - stay.number), 1) * (self.interval or 0.0)
+        told = abs(scan.stamp - stay.stamp)
         return max(counted, told) if math.isfinite(told) else counted

@@ -188,9 +188,11 @@ class Tracker:
                 self._sweeps.ask(seen, self.pose, tracked.pose, self._reachability, self._local)
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
-        held = not is_open(tracked, self.parameters.acceptance)
-        self._reachability.placed(seen.scan, tracked.pose, held=held)
-        loose = seen.loose & self._spares_things(seen)
+        self._reachability.placed(seen.scan, tracked.pose)
+        loose, held = (
+            seen.loose & self._spares_things(seen),
+            not is_open(tracked, self.parameters.acceptance),
+        )
         self._local.remember(seen.scan, seen.walls, loose, tracked.pose, held=held)
         return [(seen, tracked), *self._found_again(seen.scan)]
 
