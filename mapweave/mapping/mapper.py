@@ -39,6 +39,7 @@ from mapweave.scan.own_body import OwnBody, OwnBodyParameters
 from mapweave.scan.scan import UNNUMBERED, Scan
 
 AT_ONCE = 2  # scans that wait are placed with each one that comes: a loss holds nobody up
+AGAIN = 4  # scans are taken with each one that comes, of those that are judged again
 SUSPENSE = 24  # times the patience, while it is open whether a robot sees itself
 
 
@@ -124,6 +125,7 @@ class Mapper:
         self._body = OwnBody(self.parameters.own_body)
         # Scans to be placed: the last, and after a loss those that were missed before it.
         self._waiting: deque[Observation] = deque()
+        self._again: deque[Scan] = deque()  # raw scans to be taken once more, and those since
         # Raw scans so far, as long as no submap is finished.
         self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._sweeps = SweepJudge(self.parameters.sweeps)
@@ -174,7 +176,7 @@ class Mapper:
         finished = len(self._finished)
         if self._body.watch(scan) or self._sweeps.take_news():
             self._judge_again()
-        placed, lost = self._take(scan)
+        placed, lost = self._take_next(scan)
         pose, uncertainty = self._whereabouts() if placed else (None, None)
         submap_finished = len(self._finished) > finished
         return Placement(placed, self._component, submap_finished, lost, pose, uncertainty)
@@ -187,6 +189,8 @@ class Mapper:
         if self._is_finished:
             return self.robot_map()
         self._is_finished = True
+        while self._again:
+            self._take(self._again.popleft())
         while self._waiting:
             self._take_first()
         self._merge_all(self._tracker.settle())
@@ -238,6 +242,16 @@ class Mapper:
         self._next_index = index + 1
         return scan if scan.index == index else replace(scan, index=index)
 
+    def _take_next(self, scan: Scan) -> tuple[bool, bool]:
+        """Take a raw scan, or put it last while others are judged again; return as `_take`."""
+        self._again.append(scan)
+        placed = lost = False
+        for _ in range(min(AGAIN, len(self._again))):
+            first = self._again.popleft()
+            found, was_lost = self._take(first)
+            placed, lost = found and first is scan, lost or was_lost
+        return placed, lost
+
     def _take(self, scan: Scan) -> tuple[bool, bool]:
         """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
         if not self._has_finished:
@@ -278,13 +292,14 @@ class Mapper:
     def _judge_again(self) -> None:
         """Map all there is once more, as it is now known what of it is the robot's own body.
 
-        Or how long its sweeps take. What is in a finished submap stays as it is.
+        Or how long its sweeps take. What is in a finished submap stays as it is. Some scans at a
+        time, with those that come: all at once they would hold up the next.
         """
         self._say_body()
         self._say_sweep()
         if self._has_finished:
             return
-        early = list(self._early)
+        self._again.extendleft(reversed(self._early))
         self._early.clear()
         self._waiting.clear()
         self._tracker = Tracker(self.parameters.tracker, self._sweeps)
@@ -294,8 +309,6 @@ class Mapper:
         self._origin = self._frame = se2.IDENTITY
         self._merged = {}
         self._version += 1
-        for scan in early:
-            self._take(scan)
 
     def _say_body(self) -> None:
         """Tell once that the robot sees itself."""

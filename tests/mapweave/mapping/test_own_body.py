@@ -8,7 +8,8 @@ import pytest
 
 from mapweave.geometry.arrays import FloatArray
 from mapweave.io.readers import read_scans
-from mapweave.mapping.mapper import Mapper
+from mapweave.mapping.mapper import AGAIN, Mapper
+from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
 from mapweave.scan.scan import Scan
 from mapweave_deploy.sim.own_body import OwnBodyParameters, body_ranges
 from tests.mapweave.buildings import AROUND, BUILDING, corridor, tour, walls_of
@@ -67,6 +68,25 @@ def test_the_body_is_in_no_map() -> None:
     # The way keeps 0.9 m from every wall: nothing is nearer to it but the robot.
     away = np.hypot(*(middles[:, None] - TOUR[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
     assert away.min() > 0.7
+
+
+def test_scans_that_are_judged_again_hold_up_no_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few are taken with each scan that comes, until the last is placed as it comes again."""
+    taken: list[int] = []
+
+    def counted(scan: Scan, parameters: ObservationParameters) -> Observation:
+        taken[-1] += 1
+        return observe(scan, parameters)
+
+    monkeypatch.setattr("mapweave.mapping.mapper.observe", counted)
+    true = np.array(list(tour([(2, 1), (13, 1), (13, -2), (13, 1), (28, 1)], 0.15)))
+    mapper, placed = Mapper("a"), []
+    for scan in with_body(scans_at(walls_of(BUILDING), true, 0.25), 120, 0.25):
+        taken.append(0)
+        placed.append(mapper.add(scan).placed)
+    assert 1 < max(taken) <= AGAIN
+    assert taken[-1] == 1 and placed[-1]
+    assert len(errors(mapper.finish(), true)) >= len(true) - 2
 
 
 def narrow(aside: float) -> tuple[FloatArray, FloatArray]:
