@@ -22,6 +22,7 @@ from mapweave.mapping.loops.submap_graph import joining_covariance, tracking_cov
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
 from mapweave.parameters import StageParameters, derived
 from mapweave.team.alignment_graph import Cluster
+from mapweave.team.recent import Recent
 
 
 class JointOptimizationParameters(StageParameters):
@@ -98,10 +99,12 @@ class JointOptimizer:
         self._p = parameters or JointOptimizationParameters()
         self._loops = LoopCloser(self._p.loops)
         self._known: dict[_Compared, Constraint | None] = {}  # what was asked for last comes last
+        self._tracks: Recent[tuple[Trajectory, bytes], FloatArray] = Recent()
         self.turn()
 
     def turn(self, *, patient: bool = False) -> None:
         """Begin another version; one that is `patient` waits for all its comparisons."""
+        self._tracks.turn()
         self._left: int | None = None if patient else self._p.at_once
         self._asked = 0
         self.has_more = False
@@ -141,12 +144,15 @@ class JointOptimizer:
         """Yield how each submap of a component lies to the one before, tracked or joined."""
         for k, (one, other) in enumerate(pairwise(nodes)):
             if one.component == other.component:
-                step, p = se2.between(one.submap.pose, other.submap.pose), self._p.loops.graph
-                if _follows(one, other):
-                    covariance = tracking_covariance(one.submap.trajectory, step, p)
-                else:
-                    covariance = joining_covariance(p)
-                yield Constraint(k, k + 1, step, covariance, True)
+                step = se2.between(one.submap.pose, other.submap.pose)
+                yield Constraint(k, k + 1, step, self._covariance(one, other, step), True)
+
+    def _covariance(self, one: _Node, other: _Node, step: FloatArray) -> FloatArray:
+        """(3, 3) of the `step` (3,) from a submap of a component to the next one in it."""
+        path, p = one.submap.trajectory, self._p.loops.graph
+        if not _follows(one, other):
+            return joining_covariance(p)
+        return self._tracks.get((path, step.tobytes()), lambda: tracking_covariance(path, step, p))
 
     def _aligned(
         self, nodes: Sequence[_Node], cluster: Cluster, alignments: Sequence[Alignment]

@@ -1,6 +1,6 @@
 """How sure each segment of a joint map is: by the scans that saw it, and the robots' vote."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,11 +80,10 @@ def segment_confidence(
         return np.empty(0)
     oriented, owner = points_on_lines(lines, parameters.spacing)
     confirm, deny = np.zeros(len(oriented)), np.zeros(len(oriented))
-    for pieces in views:
+    for pieces in filter(None, views):
         near = np.zeros(len(oriented), dtype=np.bool_)
         through = near.copy()
-        for witness, pose in pieces:
-            known, said = _heard(witness, pose, oriented.points)
+        for known, said in _heard(pieces, oriented.points):
             near[known] |= said == CONFIRMS
             through[known] |= said == DENIES
         confirm += near
@@ -96,16 +95,20 @@ def segment_confidence(
 
 
 def _heard(
-    witness: Witness, pose: FloatArray, points: FloatArray
-) -> tuple[IntArray, NDArray[np.uint8]]:
-    """Return which of (n, 2) `points` a piece at `pose` knows of, and what it says of each."""
-    size = np.array(witness.said.shape) * witness.cell
-    x, y = se2.transform_points(pose, witness.origin + size / 2).tolist()
-    reach = np.hypot(*size) / 2 + witness.cell
-    near = np.flatnonzero((np.abs(points[:, 0] - x) <= reach) & (np.abs(points[:, 1] - y) <= reach))
-    index = (se2.transform_points(se2.inverse(pose), points[near]) - witness.origin) / witness.cell
-    rows, columns = witness.said.shape
-    i, j = index[:, 0], index[:, 1]
-    inside = np.flatnonzero((i >= 0) & (j >= 0) & (i < rows) & (j < columns))
-    said = witness.said[i[inside].astype(np.int64), j[inside].astype(np.int64)]
-    return near[inside], said
+    pieces: Sequence[tuple[Witness, FloatArray]], points: FloatArray
+) -> Iterator[tuple[IntArray, NDArray[np.uint8]]]:
+    """Yield which of (n, 2) `points` each piece knows of, and what it says of each.
+
+    All at once: there are hundreds of pieces, of few points each.
+    """
+    back = se2.inverse(np.array([pose for _, pose in pieces]))
+    origin = np.array([witness.origin for witness, _ in pieces])
+    cell = np.array([[witness.cell] for witness, _ in pieces])
+    rows, columns = np.array([witness.said.shape for witness, _ in pieces]).T[:, :, None]
+    (x, y), (c, s) = points.T, (np.cos(back[:, 2:]), np.sin(back[:, 2:]))
+    i = (x * c - y * s + (back[:, :1] - origin[:, :1])) / cell
+    j = (x * s + y * c + (back[:, 1:2] - origin[:, 1:])) / cell
+    inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
+    for k, (witness, _) in enumerate(pieces):
+        known = np.flatnonzero(inside[k])
+        yield known, witness.said[i[k, known].astype(np.int64), j[k, known].astype(np.int64)]
