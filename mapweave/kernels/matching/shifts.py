@@ -127,7 +127,8 @@ def best_shifts(
     Raises
     ------
     ValueError
-        Where a map is too large for such cells, or its walls are not in its raster.
+        Where a map is too large for such cells, or its walls are not in its raster. Compiled, also
+        where the cells are too wide for sums of sixteen bits: more than some tens of the raster's.
     """
     if COMPILED is None:
         here, there = cast("tuple[PlaceViewNumpy, PlaceViewNumpy]", (reference, other))
