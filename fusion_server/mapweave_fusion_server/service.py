@@ -206,6 +206,8 @@ class Service:
 
     def _say_how_it_is(self, now: float) -> None:
         """Tell the team where that is due, and the live page every second."""
+        if now < self._report_due and not self._speaking.may_be_due(now):
+            return
         self._latest = status = self._status()
         # That a version is being made is said by the version.
         told = status.model_copy(update={"stamp": 0.0, "pending": False})

@@ -43,6 +43,10 @@ class StatusSchedule:
         """Note that there is something that is waited for."""
         self._last = -math.inf
 
+    def may_be_due(self, now: float) -> bool:
+        """Tell whether a status may be sent by `now` [s]: whether it is worth making one."""
+        return now - self._last >= self._least
+
     def due(self, now: float, state: object, *, lacks: bool = False) -> bool:
         """Tell whether a status is to be sent.
 
@@ -55,13 +59,12 @@ class StatusSchedule:
         lacks
             Whether something is known of that is not here: who has it is told again sooner.
         """
-        waited = now - self._last
-        if waited < self._least:
+        if not self.may_be_due(now):
             return False
         times = (self._met + k * AGAIN for k in range(1, TIMES + 1))
         again = any(self._last < time <= now for time in times)
         interval = self._interval / 2 if lacks else self._interval
-        return again or state != self._said or waited >= interval
+        return again or state != self._said or now - self._last >= interval
 
     def sent(self, now: float, state: object) -> None:
         """Note that a status was sent."""

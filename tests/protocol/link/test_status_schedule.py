@@ -13,6 +13,17 @@ def test_a_status_is_sent_on_a_change_and_now_and_then() -> None:
     assert statuses.due(1.0, "finished")
 
 
+def test_no_status_need_be_made_before_one_may_be_sent() -> None:
+    """Whatever has changed, and unless something is waited for."""
+    statuses = StatusSchedule(10.0, 1.0)
+    assert statuses.may_be_due(0.0)
+    statuses.sent(0.0, "mapping")
+    assert not statuses.may_be_due(0.9)
+    assert statuses.may_be_due(1.0)
+    statuses.hurry()
+    assert statuses.may_be_due(0.1)
+
+
 def test_who_lacks_something_says_so_twice_as_often() -> None:
     statuses = StatusSchedule(10.0, 1.0)
     statuses.sent(0.0, "mapping")
