@@ -9,7 +9,7 @@ PACKAGES := mapweave protocol ros agent fusion_server deploy
 SOURCES := pyproject.toml README.md LICENSE \
 	$(shell find $(PACKAGES) -name __pycache__ -prune -o -print)
 # PYTHONSAFEPATH: programs that tests start import the wheel as well, not the checkout.
-TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 3
+TEST_WHEEL := PYTHONSAFEPATH=1 MAPWEAVE_INSTALLED=1 $(WHEEL_BIN)/pytest -n 2
 
 .PHONY: demo test test-all quick matrix durations lint format wheel bench bench-map bench-fusion
 .PHONY: bench-speed bench-faults bench-live bench-page bench-robots bench-shape

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mapweave.maps import Alignment, LineMap, RobotMap, Submap, Trajectory
 from mapweave_protocol.link.assembler import MapSender
@@ -22,6 +23,7 @@ def grown(robot_map: RobotMap) -> RobotMap:
     return replace(robot_map, version=robot_map.version + 1, submaps=(*robot_map.submaps, wing))
 
 
+@pytest.mark.slow
 def test_a_join_is_kept_when_the_map_of_a_peer_has_grown(
     endpoint: str, team: str, logs: list[Path]
 ) -> None:

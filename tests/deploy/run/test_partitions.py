@@ -60,6 +60,7 @@ def are_joined(plan: Plan) -> bool:
     return joined_names(plan) == {"r1/0", "r2/0"}
 
 
+@pytest.mark.slow
 def test_two_halves_with_a_coordinator_each_are_one_joint_map_after_the_link_returns(
     halves: Halves, tmp_path: Path
 ) -> None:

@@ -44,6 +44,7 @@ def record(folder: Path, seed: int) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_two_buildings_end_in_two_components_rightly(tmp_path: Path) -> None:
     logs = [str(record(tmp_path, seed)) for seed in (1, 2)]
     said = run_team(tmp_path / "team", *logs, "--robots", "2").said
