@@ -70,8 +70,8 @@ def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None
     Parameters
     ----------
     niceness
-        How much nicer this process is than the agent; the nicest there are, `LAST`, run where
-        nothing else would, so that they give way to agents that are as nice themselves.
+        How much nicer this process is than the agent. One that is to be as nice as can be, `LAST`,
+        runs where nothing else would if the agent itself is as nice, to give way to it as well.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the agent ends this process itself
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -85,8 +85,10 @@ def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None
 
 
 def _give_way(niceness: int) -> None:
+    cannot_be_nicer = os.nice(0) >= LAST
     os.nice(niceness)
-    if niceness >= LAST and sys.platform == "linux":
+    # Not beside any other agent: on a robot whose cores are taken, maps would never be compared.
+    if niceness >= LAST and cannot_be_nicer and sys.platform == "linux":
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 

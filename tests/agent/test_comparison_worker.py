@@ -3,8 +3,11 @@
 import operator
 import os
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from mapweave_agent.comparison_schedule import Comparison
 from mapweave_agent.comparison_worker import ComparisonOutcome, ComparisonWorker
 
 PATIENCE = 60.0  # [s]
+ROOT = Path(__file__).parents[2]
 
 
 def outcome_of(comparer: ComparisonWorker) -> ComparisonOutcome:
@@ -47,12 +51,33 @@ def test_what_comes_back_is_what_the_function_returns() -> None:
     assert (alignment.decision, alignment.reason) == (expected.decision, expected.reason)
 
 
-@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="schedulers as Linux has them")
-def test_maps_are_compared_where_nothing_else_would_run() -> None:
+AS_NICE_AS_CAN_BE = """
+import os
+
+from mapweave.fusion.align import align
+from mapweave_agent.comparison_worker import ComparisonWorker
+from tests.agent.test_comparison_worker import COMPARISON, outcome_of
+
+if __name__ == "__main__":
+    os.nice(19)
     with ComparisonWorker(align) as comparer:
         comparer.start(COMPARISON)
         outcome_of(comparer)
-        assert os.sched_getscheduler(comparer.pid) == os.SCHED_IDLE
+        print(os.sched_getscheduler(comparer.pid))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="schedulers as Linux has them")
+def test_maps_are_compared_after_all_else_but_never_not_at_all() -> None:
+    """Beside an agent that is as nice as can be, comparing runs where nothing else would."""
+    with ComparisonWorker(align) as comparer:
+        comparer.start(COMPARISON)
+        outcome_of(comparer)
+        assert os.sched_getscheduler(comparer.pid) == os.SCHED_OTHER
+        assert os.getpriority(os.PRIO_PROCESS, comparer.pid) == 19
+    command = [sys.executable, "-c", AS_NICE_AS_CAN_BE]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [str(os.SCHED_IDLE)]
 
 
 def test_a_function_takes_its_parameters_along() -> None:
