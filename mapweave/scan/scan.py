@@ -118,7 +118,8 @@ class Scan:
         angle_increment
             From each beam to the next [rad]; negative for a sensor that turns clockwise.
         range_min, range_max
-            [m] readings below or above are no returns; a number that is no distance states nothing.
+            [m] readings below the one are no returns, nor are those at the other and beyond, as
+            some lidars and simulators write; a number that is no distance states nothing.
         index, stamp, odometry
             As of `Scan`.
         time_increment
@@ -143,7 +144,7 @@ class Scan:
         low, high = _span(range_min, range_max)
         given = as_numbers("ranges", ranges, "expected (n,) distances [m]")
         check_metres(given)
-        used = np.where((given >= low) & (given <= high), given, np.nan)
+        used = np.where((given >= low) & (given < high), given, np.nan)
         angles = first + step * np.arange(given.size, dtype=np.float64)
         each = as_number("time_increment", time_increment, "expected a time [s]")
         swept = each * max(given.size - 1, 0)

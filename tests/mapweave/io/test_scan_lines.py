@@ -44,7 +44,7 @@ def test_the_format_may_stand_in_each_line() -> None:
 
 def test_ranges_out_of_bounds_and_of_any_writing_of_none_are_no_returns() -> None:
     text = json.dumps(LINE | {"range_min": 1.0, "range_max": 4.0, "ranges": []})
-    (scan,) = read(text.replace("[]", "[2.0, 0.5, 4.5, 0, -1, NaN, Infinity, null]"))
+    (scan,) = read(text.replace("[]", "[2.0, 0.5, 4.0, 4.5, 0, -1, NaN, Infinity, null]"))
     assert scan.ranges[0] == 2.0
     assert np.isnan(scan.ranges[1:]).all()
 

@@ -59,8 +59,9 @@ def test_what_drivers_state_is_the_scan_whichever_way_it_is_stated(
 
 
 def test_readings_out_of_the_drivers_range_are_no_returns() -> None:
-    scan = Scan.of([0.01, 1.0, 30.0, 31.0], 0.0, 0.1, range_min=0.02, range_max=30.0, stamp=7.0)
-    assert scan.hits.tolist() == [False, True, True, False]
+    ranges = [0.01, 0.02, 29.99, 30.0, 31.0]
+    scan = Scan.of(ranges, 0.0, 0.1, range_min=0.02, range_max=30.0, stamp=7.0)
+    assert scan.hits.tolist() == [False, True, True, False, False]
     assert scan.stamp == 7.0
 
 

@@ -102,8 +102,7 @@ def _serde_error() -> type[Exception]:
 
 
 def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
-    """Return the scan; a reading of the maximum, and beyond, is one that did not come back."""
-    maximum = laser.range_max
+    """Return the scan of a message."""
     with np.errstate(invalid="ignore"):  # NaN of the kind that signals
         measured = laser.ranges.astype(np.float64)
     stamp = laser.header.stamp
@@ -112,7 +111,7 @@ def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
         laser.angle_min,
         laser.angle_increment,
         range_min=laser.range_min if laser.range_min > 0 else 0.0,  # also where it is NaN
-        range_max=math.nextafter(maximum, 0) if maximum > 0 else math.inf,  # likewise
+        range_max=laser.range_max if laser.range_max > 0 else math.inf,  # likewise
         index=index,
         stamp=stamp.sec + stamp.nanosec * 1e-9,
         time_increment=laser.time_increment if laser.time_increment > 0 else 0.0,
