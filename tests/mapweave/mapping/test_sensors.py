@@ -4,11 +4,11 @@ The plain one looks all round 40 times a second. What it measured is told again 
 would tell it; steps of a second are compared with the true ones.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
-import math
 import numpy as np
 import pytest
 
