@@ -200,9 +200,7 @@ class PointMap {
     for (Point& point : fresh) {  // afterwards: a block's own points do not thin each other
       point.number = first_ + static_cast<int64_t>(known_.size());
       reach_out(point.x, point.y);
-      Cell& here = cells_[cell_of(point.x, point.y)];
-      if (here.points.empty()) tell_around(index(point.x) - left_, index(point.y) - low_);
-      here.add(point);
+      cell_at(index(point.x) - left_, index(point.y) - low_).add(point);
       known_.push_back({point.x, point.y, point.nx, point.ny, block_});
       seen_in_.back().push_back(point.number);
       sample(point.number);
@@ -347,6 +345,7 @@ class PointMap {
   std::deque<Known> known_;                             // by number, from first_ on
   std::deque<std::vector<int64_t>> seen_in_ = {{}};     // numbers seen in each of the last blocks
   int64_t left_ = 0, low_ = 0, columns_ = 0, rows_ = 0;  // the cells there are
+  std::vector<int32_t> place_;  // of each cell in `cells_`, where it holds a point or did; -1 of most
   std::vector<Cell> cells_;
   std::vector<uint8_t> empty_;  // rings about each cell, itself the first, that hold no point for sure
   mutable std::vector<Known> sampled_;  // of the points that are there, those with a multiple of `every_`, if it is set
@@ -402,6 +401,27 @@ class PointMap {
     return static_cast<size_t>((index(x) - left_) * rows_ + (index(y) - low_));
   }
 
+  // The cell in a column and a row, made if there is none.
+  Cell& cell_at(int64_t i, int64_t j) {
+    int32_t& place = place_[static_cast<size_t>(i * rows_ + j)];
+    if (place < 0) {
+      place = static_cast<int32_t>(cells_.size());
+      cells_.emplace_back();
+      tell_around(i, j);
+    }
+    return cells_[static_cast<size_t>(place)];
+  }
+
+  // Calls `visit` with the column and the row of each cell that holds a point, and the cell.
+  template <typename Visit>
+  void occupied(Visit&& visit) {
+    for (int64_t i = 0; i < columns_; ++i)
+      for (int64_t j = 0; j < rows_; ++j) {
+        const int32_t place = place_[static_cast<size_t>(i * rows_ + j)];
+        if (place >= 0 && !cells_[place].points.empty()) visit(i, j, cells_[place]);
+      }
+  }
+
   // Tells the cells about one that it holds a point.
   void tell_around(int64_t i, int64_t j) {
     for (int64_t a = std::max<int64_t>(0, i - kRings); a <= std::min(columns_ - 1, i + kRings); ++a) {
@@ -433,19 +453,17 @@ class PointMap {
 
   void lay_out(int64_t left, int64_t low, int64_t columns, int64_t rows) {
     if (columns > kMaxCells / rows) throw std::invalid_argument("points: spread over too wide an area");
-    std::vector<Cell> cells(static_cast<size_t>(columns * rows));
-    for (int64_t i = 0; i < columns_; ++i)
-      for (int64_t j = 0; j < rows_; ++j) {
-        const int64_t a = i + left_ - left, b = j + low_ - low;
-        if (a >= 0 && a < columns && b >= 0 && b < rows)
-          cells[a * rows + b] = std::move(cells_[i * rows_ + j]);
-      }
-    cells_ = std::move(cells);
+    const size_t count = static_cast<size_t>(columns * rows);
+    std::vector<int32_t> place(count, -1);
+    std::vector<Cell> cells;
+    occupied([&](int64_t i, int64_t j, Cell& cell) {
+      place[static_cast<size_t>((i + left_ - left) * rows + (j + low_ - low))] = static_cast<int32_t>(cells.size());
+      cells.push_back(std::move(cell));
+    });
+    place_ = std::move(place), cells_ = std::move(cells);
     left_ = left, low_ = low, columns_ = columns, rows_ = rows;
-    empty_.assign(cells_.size(), static_cast<uint8_t>(kRings + 1));
-    for (int64_t i = 0; i < columns_; ++i)
-      for (int64_t j = 0; j < rows_; ++j)
-        if (!cells_[i * rows_ + j].points.empty()) tell_around(i, j);
+    empty_.assign(count, static_cast<uint8_t>(kRings + 1));
+    occupied([&](int64_t i, int64_t j, const Cell&) { tell_around(i, j); });
   }
 
   void renew(int64_t number) {
@@ -465,7 +483,7 @@ class PointMap {
       if (known.seen != oldest) continue;
       known.seen = -1;
       gone.push_back(number);
-      cells_[cell_of(known.x, known.y)].remove(number);
+      cells_[place_[cell_of(known.x, known.y)]].remove(number);
       --count_;
     }
     sample_less(gone);
@@ -476,12 +494,10 @@ class PointMap {
 
   void shrink() {
     int64_t first = columns_, last = -1, lowest = rows_, highest = -1;
-    for (int64_t i = 0; i < columns_; ++i)
-      for (int64_t j = 0; j < rows_; ++j) {
-        if (cells_[i * rows_ + j].points.empty()) continue;
-        first = std::min(first, i), last = std::max(last, i);
-        lowest = std::min(lowest, j), highest = std::max(highest, j);
-      }
+    occupied([&](int64_t i, int64_t j, const Cell&) {
+      first = std::min(first, i), last = std::max(last, i);
+      lowest = std::min(lowest, j), highest = std::max(highest, j);
+    });
     if (last < first) return;
     const int64_t columns = last - first + 1 + 2 * kMargin, rows = highest - lowest + 1 + 2 * kMargin;
     if (columns * rows * 2 < columns_ * rows_) lay_out(left_ + first - kMargin, low_ + lowest - kMargin, columns, rows);
@@ -494,14 +510,14 @@ class PointMap {
     const int64_t a0 = std::max(i - r, left_), a1 = std::min(i + r, left_ + columns_ - 1);
     const int64_t b0 = std::max(j - r, low_), b1 = std::min(j + r, low_ + rows_ - 1);
     for (int64_t a = a0; a <= a1; ++a) {
-      const Cell* column = cells_.data() + (a - left_) * rows_ - low_;
+      const int32_t* place = place_.data() + (a - left_) * rows_ - low_;
       const uint8_t* empty = empty_.data() + (a - left_) * rows_ - low_;
       if (a == i - r || a == i + r) {
         for (int64_t b = b0; b <= b1; b += std::max<int64_t>(1, empty[b]))
-          if (!empty[b]) visit(column[b], a, b);
+          if (!empty[b]) visit(cells_[place[b]], a, b);
       } else {
-        if (j - r >= low_ && j - r < low_ + rows_ && !empty[j - r]) visit(column[j - r], a, j - r);
-        if (r > 0 && j + r >= low_ && j + r < low_ + rows_ && !empty[j + r]) visit(column[j + r], a, j + r);
+        if (j - r >= low_ && j - r < low_ + rows_ && !empty[j - r]) visit(cells_[place[j - r]], a, j - r);
+        if (r > 0 && j + r >= low_ && j + r < low_ + rows_ && !empty[j + r]) visit(cells_[place[j + r]], a, j + r);
       }
     }
   }
@@ -577,8 +593,10 @@ class PointMap {
     const int64_t i0 = std::max(index(x - wide), left_), i1 = std::min(index(x + wide), left_ + columns_ - 1);
     const int64_t j0 = std::max(index(y - wide), low_), j1 = std::min(index(y + wide), low_ + rows_ - 1);
     for (int64_t i = i0; i <= i1; ++i)
-      for (int64_t j = j0; j <= j1; ++j)
-        if (cells_[(i - left_) * rows_ + (j - low_)].least_two(x, y, u, v).least < limit) return true;
+      for (int64_t j = j0; j <= j1; ++j) {
+        const int32_t place = place_[static_cast<size_t>((i - left_) * rows_ + (j - low_))];
+        if (place >= 0 && cells_[place].least_two(x, y, u, v).least < limit) return true;
+      }
     return false;
   }
 
