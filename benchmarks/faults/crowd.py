@@ -135,6 +135,12 @@ def delays(heard: Heard, begun: Sequence[float]) -> list[float]:
     return found
 
 
+def took(heard: Heard, begun: Sequence[float]) -> list[float]:
+    """Return how long each version that came took since it was `begun` [s], version 1 first."""
+    versions = enumerate(begun, start=1)
+    return [heard.versions[n] - at for n, at in versions if n in heard.versions]
+
+
 def drive(folder: Path, robots: int, seconds: float) -> list[Member]:
     """Write logs of so many robots that drive through one office, and return the robots."""
     world, lidar = office(1), LidarParameters()
@@ -219,6 +225,8 @@ def run(options: argparse.Namespace) -> None:
             begun = [at for _, at in store.versions_created(0, 10**6)]
     late = delays(heard, begun)
     p50, p99 = np.percentile(late, [50, 99]) if late else (np.inf, np.inf)
+    parts = np.array_split(took(heard, begun), 4)
+    quarters = [np.percentile(part, [50, 99]) for part in parts if len(part)]
     figures = usage.figures()
     rows = [[each.name, *(f"{n:.1f}" for n in each.numbers)] for each in figures]
     print(format_table(["process", "MiB at half", "MiB at the end", "CPU s/s"], rows))
@@ -227,9 +235,12 @@ def run(options: argparse.Namespace) -> None:
         f"{counted} maps of {options.robots} robots, {len(begun)} versions; missed: {lacking or 0}"
     )
     print(f"from a map to its version: p50 {p50:.2f} s, p99 {p99:.2f} s, bar: {MOST_LATE:g} s")
+    told = ", ".join(f"{half:.2f} and {most:.2f} s" for half, most in quarters)
+    print(f"of that, a version took, p50 and p99 of each quarter of them: {told}")
     grown = [each.name for each in figures if each.has_grown(MOST_GROWN, LEAST_GROWN)]
     print(f"memory grew by more than {MOST_GROWN:.0%} in the second half: {grown or 'none'}")
     outcome = {"p50": p50, "p99": p99, "missed": lacking, "usage": [asdict(f) for f in figures]}
+    outcome["took"] = np.array(quarters).tolist()
     write_json(options.output / "crowd.json", outcome)
     if lacking or grown or p99 > MOST_LATE:
         sys.exit(1)

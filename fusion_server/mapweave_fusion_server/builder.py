@@ -9,7 +9,7 @@ from types import TracebackType
 from mapweave.config import Config
 from mapweave.maps import JointMap
 from mapweave.team.joining import JointParameters
-from mapweave.team.joint_builder import JointMapBuilder
+from mapweave.team.joint_builder import JointMapBuilder, OvertakenError
 from mapweave.team.joint_optimization import JointOptimizationParameters
 from mapweave_fusion_server.draft import Draft
 from mapweave_protocol.wire.codec import encode
@@ -97,24 +97,34 @@ class VersionBuilder:
         """Whether `take` returns at once."""
         return self._future is not None and self._future.done()
 
-    def start(self, draft: Draft, begun: float, *, patient: bool = False) -> None:
+    def start(
+        self,
+        draft: Draft,
+        begun: float,
+        *,
+        patient: bool = False,
+        is_overtaken: Callable[[], bool] | None = None,
+    ) -> None:
         """Start building `draft`, made of all that was known at `begun` [s since 1970].
 
-        If it is `patient` nothing waits for the next version, however long this one takes.
+        If it is `patient` nothing waits for the next version, however long this one takes. One that
+        nobody waits for is given up when it `is_overtaken`, asked in the builder's thread.
         """
-        self._future = self._worker.submit(self._build, draft, begun, patient)
+        self._future = self._worker.submit(self._build, draft, begun, patient, is_overtaken)
         self._future.add_done_callback(lambda _: self._ready())
 
     def take(self) -> Built | None:
         """Return the version that was started, when it is done; None when it could not be built.
 
-        That is logged as the fault it is: a map nobody expected must not end the service, and the
-        next change brings another try.
+        Unless it was overtaken, that is logged as the fault it is: a map nobody expected must not
+        end the service, and the next change brings another try.
         """
         future, self._future = self._future, None
         if future is None:
             return None
         error = future.exception()
+        if isinstance(error, OvertakenError):
+            return None
         if error is not None:
             _log.error("a version could not be built: %s", error, exc_info=error)
             return None
@@ -125,8 +135,10 @@ class VersionBuilder:
         message, payload = self._packed(built.joint)
         return replace(built, message=message, payload=payload)
 
-    def _build(self, draft: Draft, begun: float, patient: bool) -> Built:
-        joint = draft.build(self._builder, patient=patient)
+    def _build(
+        self, draft: Draft, begun: float, patient: bool, is_overtaken: Callable[[], bool] | None
+    ) -> Built:
+        joint = draft.build(self._builder, patient=patient, is_overtaken=is_overtaken)
         return Built(draft, begun, joint, *self._packed(joint), self._builder.has_more)
 
     def _packed(self, joint: JointMap) -> tuple[JointMapMessage, bytes]:

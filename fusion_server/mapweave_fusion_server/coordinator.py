@@ -88,7 +88,8 @@ class Coordinator:
         self._said = Said()
         self._urgency = Urgency.NONE
         self._draft: Draft | None = None
-        self._begun = -math.inf
+        self._drafted = Urgency.NONE
+        self._begun = self._drafted_at = -math.inf
 
     @property
     def has_news(self) -> bool:
@@ -104,6 +105,15 @@ class Coordinator:
     def is_pending(self) -> bool:
         """Whether something was received that is in no version yet."""
         return self.has_news or self._draft is not None
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether the draft has something in it that was received, and not only compares more."""
+        return self._drafted > Urgency.MORE
+
+    def has_more_to_tell(self) -> bool:
+        """Tell whether something was received since the draft; usable from another thread."""
+        return self._urgency > Urgency.MORE
 
     @property
     def maps_held(self) -> tuple[MapVersion, ...]:
@@ -263,19 +273,20 @@ class Coordinator:
         alignments = tuple(self._alignments_in_force())
         orders = self._said.orders(self._maps, self._shown_maps)
         self._draft = Draft(self._version + 1, self.maps, alignments, self._judged, orders)
-        self._begun, self._urgency = now, Urgency.NONE
+        self._drafted, self._urgency = self._urgency, Urgency.NONE
+        self._drafted_at = now
         return self._draft
 
     def finish(self, joint: JointMap | None, *, has_more: bool = False) -> None:
-        """End the draft that became `joint`; None, when it could not be built, keeps its number.
+        """End the draft that became `joint`; None, where it was not built, keeps its number.
 
         Where what is known `has_more` in it than was made of it, another version follows.
         """
-        self._raise_urgency(Urgency.SOON if has_more else Urgency.NONE)
+        self._raise_urgency(Urgency.MORE if has_more else Urgency.NONE)
         if joint is not None:
             self._version, self._judged = joint.version, joint.alignments
-            self._is_last_known = True
-        self._draft = None
+            self._is_last_known, self._begun = True, self._drafted_at
+        self._draft, self._drafted = None, Urgency.NONE
 
     def _alignments_in_force(self) -> Iterator[Alignment]:
         """Yield the alignments between components that exist."""

@@ -1,5 +1,6 @@
 """What a version of the joint map is made of, fixed while it is being built, and how soon."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -13,8 +14,9 @@ class Urgency(IntEnum):
     """How soon the next version is due."""
 
     NONE = 0
-    SOON = 1
-    NOW = 2
+    MORE = 1  # submaps wait to be compared, and nobody for that
+    SOON = 2
+    NOW = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +41,13 @@ class Draft:
     before: tuple[Alignment, ...] = ()
     orders: tuple[Order, ...] = ()
 
-    def build(self, builder: JointMapBuilder, *, patient: bool = False) -> JointMap:
+    def build(
+        self,
+        builder: JointMapBuilder,
+        *,
+        patient: bool = False,
+        is_overtaken: Callable[[], bool] | None = None,
+    ) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
 
         Parameters
@@ -48,7 +56,14 @@ class Draft:
             Keeps what it made for the versions before.
         patient
             Whether nothing may wait for the next version.
+        is_overtaken
+            Where nobody waits for this one, asked now and then: whether another one is due.
+
+        Raises
+        ------
+        OvertakenError
+            If one was.
         """
         known = self.maps, self.alignments, self.version, self.orders
-        joint = builder.build(*known, patient=patient)
+        joint = builder.build(*known, patient=patient, is_overtaken=is_overtaken)
         return mark_revoked(joint, self.before)

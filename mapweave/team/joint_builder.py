@@ -5,9 +5,11 @@ are: rasters, what they say of each other, which submaps fit. All that is kept i
 anew of the same: so a version is the same whatever was built before.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from mapweave.errors import MapweaveError
+from mapweave.geometry.arrays import FloatArray
 from mapweave.maps import (
     Alignment,
     JointComponent,
@@ -33,6 +35,10 @@ from mapweave.team.orders.joint_marks import HeldMarks, held_marks, laid_down
 from mapweave.team.orders.rulings import Rulings
 from mapweave.team.recent import Recent
 from mapweave.team.walls.segment_confidence import Witness
+
+
+class OvertakenError(MapweaveError):
+    """A version is not made, as another one is due that has more in it."""
 
 
 class JointMapBuilder:
@@ -72,6 +78,7 @@ class JointMapBuilder:
         orders: Sequence[Order] = (),
         *,
         patient: bool = False,
+        is_overtaken: Callable[[], bool] | None = None,
     ) -> JointMap:
         """Return what the team knows, its robots' submaps woven together.
 
@@ -83,9 +90,17 @@ class JointMapBuilder:
         patient
             Whether all submaps are compared that are to be, however long that takes; if not, some
             of many wait for the next version.
+        is_overtaken
+            Of a version that only goes on comparing, asked now and then: whether something has come
+            since. None of one that somebody waits for, for which few are compared.
+
+        Raises
+        ------
+        OvertakenError
+            If it was; what was compared is kept.
         """
-        self._weaver.turn(patient=patient)
-        for kept in (self._wholes, self._witnesses, self._verdicts, self._edges, self._kept):
+        self._weaver.turn(patient=patient, is_overtaken=is_overtaken)
+        for kept in (self._wholes, self._verdicts, self._edges):
             kept.turn()
         submaps = submaps_by_component(maps)
         found = {name: self._whole(each) for name, each in submaps.items()}
@@ -102,7 +117,12 @@ class JointMapBuilder:
             self._edges,
         )
         marks = held_marks(maps)
-        joined = tuple(self._join(cluster, submaps, judged, marks) for cluster in clusters)
+        woven = [self._woven(cluster, submaps, judged) for cluster in clusters]
+        if is_overtaken is not None and is_overtaken():
+            raise OvertakenError
+        for made in (self._witnesses, self._kept):
+            made.turn()
+        joined = tuple(self._join(cluster, poses, submaps, marks) for cluster, poses in woven)
         return JointMap(version, joined, judged, orders=rulings.orders)
 
     def _whole(self, submaps: Sequence[Submap]) -> DistanceField | None:
@@ -110,18 +130,26 @@ class JointMapBuilder:
         key = tuple((s.map, s.pose.tobytes()) for s in submaps)
         return self._wholes.get(key, lambda: rasterise(lines_of(submaps), self.parameters))
 
-    def _join(
+    def _woven(
         self,
         cluster: Cluster,
         submaps: Mapping[str, Sequence[Submap]],
         judged: Sequence[Alignment],
+    ) -> tuple[Cluster, dict[str, list[FloatArray]]]:
+        """Return a cluster and its submaps' poses where they fit; a component alone stays."""
+        if len(cluster.poses) == 1:
+            return cluster, {name: [s.pose for s in submaps[name]] for name in cluster.poses}
+        woven, poses = self._weaver.weave(cluster, submaps, judged)
+        return woven, {name: list(those) for name, those in poses.items()}
+
+    def _join(
+        self,
+        cluster: Cluster,
+        poses: Mapping[str, Sequence[FloatArray]],
+        submaps: Mapping[str, Sequence[Submap]],
         marks: HeldMarks,
     ) -> JointComponent:
-        """Join a cluster, its submaps where they fit; a component alone stays as it is."""
-        poses = {name: [s.pose for s in submaps[name]] for name in cluster.poses}
-        if len(cluster.poses) > 1:
-            cluster, woven = self._weaver.weave(cluster, submaps, judged)
-            poses = {name: list(those) for name, those in woven.items()}
+        """Join a cluster, its submaps at `poses` in their components."""
         pieces = {
             name: [
                 Piece(s.map, self._witness(s.map), pose)

@@ -6,7 +6,7 @@ robust pose graph over all robots' submaps takes what is found. The robots' maps
 bend by as much; which robots are joined, and how sure that is, was decided before.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -51,12 +51,17 @@ class JointOptimizationParameters(StageParameters):
         " team it grows with every message, and goes along with the one before",
     )
     at_once: int = Field(
-        20,
+        5,
         ge=1,
-        description="new comparisons for a version, a tenth of a second; more wait for the next"
-        " one, and the maps that have come do not",
+        description="new comparisons for a version, some hundredths of a second; more wait for the"
+        " next one, and the maps that have come do not",
     )
-    remembered: int = Field(20_000, ge=1, description="comparisons, the last")
+    beside: int = Field(
+        100, ge=1, description="the same for a version that nobody waits for: half a second"
+    )
+    remembered: int = Field(
+        5000, ge=1, description="comparisons, the last; each keeps the lines of two submaps"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,11 +107,20 @@ class JointOptimizer:
         self._tracks: Recent[tuple[Trajectory, bytes], FloatArray] = Recent()
         self.turn()
 
-    def turn(self, *, patient: bool = False) -> None:
-        """Begin another version; one that is `patient` waits for all its comparisons."""
+    def turn(
+        self, *, patient: bool = False, is_overtaken: Callable[[], bool] | None = None
+    ) -> None:
+        """Begin another version; one that is `patient` waits for all its comparisons.
+
+        Parameters
+        ----------
+        is_overtaken
+            Of a version that nobody waits for, asked before each comparison: whether something has
+            come since. None where somebody waits.
+        """
         self._tracks.turn()
-        self._left: int | None = None if patient else self._p.at_once
-        self._asked = 0
+        self._patient, self._is_overtaken = patient, is_overtaken
+        self._asked = self._made = 0
         self.has_more = False
 
     def weave(
@@ -206,17 +220,25 @@ class JointOptimizer:
         self._asked += 1
         if asked in self._known:
             link = self._known.pop(asked)
-        elif self._left == 0:
+        elif self._has_made_enough():
             self.has_more = True
             return None
         else:
-            self._left = None if self._left is None else self._left - 1
+            self._made += 1
             link = self._compared(asked)
         self._known[asked] = link
         # Never what this version asks for: the next one would have to compare it again, for ever.
         while len(self._known) > max(self._p.remembered, self._asked):
             del self._known[next(iter(self._known))]
         return link
+
+    def _has_made_enough(self) -> bool:
+        """Whether further comparisons are for the next version."""
+        if self._patient:
+            return False
+        if self._is_overtaken is None:
+            return self._made >= self._p.at_once
+        return self._made >= self._p.beside or self._is_overtaken()
 
     def _candidates(self, nodes: Sequence[_Node]) -> Iterator[tuple[int, int]]:
         """Yield pairs of nodes near each other that tracking does not link."""

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 
 import pytest
 
@@ -18,9 +19,16 @@ GIVEN: list[JointParameters] = []
 class Noting(Draft):
     """A draft that notes what it is built with."""
 
-    def build(self, builder: JointMapBuilder, *, patient: bool = False) -> JointMap:
+    def build(
+        self,
+        builder: JointMapBuilder,
+        *,
+        patient: bool = False,
+        is_overtaken: Callable[[], bool] | None = None,
+    ) -> JointMap:
         """Return a map of nothing."""
         assert not patient
+        assert is_overtaken is None
         GIVEN.append(builder.parameters)
         return JointMap(self.version, (), ())
 
@@ -41,6 +49,17 @@ def test_a_version_that_is_ready_is_told_of_at_once() -> None:
         builder.start(Draft(1, (), ()), time.time())
         assert told.wait(60.0)
         assert builder.is_ready
+
+
+def test_a_version_that_was_overtaken_is_given_up_and_that_is_no_fault(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with VersionBuilder("series", Config()) as builder:
+        builder.start(Draft(1, (), ()), time.time(), is_overtaken=lambda: True)
+        assert builder.take() is None
+        builder.start(Draft(1, (), ()), time.time(), is_overtaken=lambda: False)
+        assert builder.take() is not None
+    assert not caplog.records
 
 
 def test_a_version_says_whether_submaps_wait_for_the_next_one(

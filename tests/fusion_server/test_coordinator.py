@@ -168,6 +168,24 @@ def test_another_version_follows_one_that_left_something_to_be_made(make_map: Ma
     assert not coordinator.is_pending
 
 
+def test_a_version_that_only_compares_what_was_left_is_overtaken_by_what_comes(
+    make_map: MakeMap,
+) -> None:
+    coordinator = _coordinator(min_interval=2.0)
+    coordinator.receive_map(make_map("a"))
+    first = coordinator.begin(0.0)
+    assert coordinator.is_awaited
+    coordinator.finish(JointMap(first.version, (), ()), has_more=True)
+    coordinator.begin(7.0)
+    assert not coordinator.is_awaited
+    assert not coordinator.has_more_to_tell()
+    coordinator.receive_map(make_map("b"))
+    assert coordinator.has_more_to_tell()
+    coordinator.finish(None)
+    assert coordinator.seconds_until_due(7.1) == 0.0
+    assert _make_version(coordinator, now=7.1).version == 2
+
+
 def test_numbering_goes_on_after_a_restart(make_map: MakeMap) -> None:
     coordinator = _coordinator(last_version=41)
     coordinator.receive_map(make_map("a"))

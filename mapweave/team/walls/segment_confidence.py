@@ -31,11 +31,14 @@ class SegmentConfidenceParameters(StageParameters):
 
 
 SILENT, CONFIRMS, DENIES = range(3)
+SIDE_BY_SIDE = 4  # cells in a byte, two bits each
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Witness:
-    """What a piece says of walls, by place: a byte a cell, of all that its raster knows.
+    """What a piece says of walls, by place: two bits a cell, of all that its raster knows.
+
+    A team has hundreds of pieces, each with tens of thousands of cells.
 
     Attributes
     ----------
@@ -43,21 +46,32 @@ class Witness:
         (2,) the corner [m], frame of the piece.
     cell
         [m].
+    shape
+        Rows and columns.
     said
-        (rows, columns) whether a wall there is confirmed or denied.
+        (rows, columns / 4, rounded up) whether a wall there is confirmed or denied, the first of
+        four cells in the lowest bits.
     """
 
     origin: FloatArray
     cell: float
+    shape: tuple[int, int]
     said: NDArray[np.uint8]
 
     @classmethod
     def of(cls, raster: DistanceField, p: SegmentConfidenceParameters) -> "Witness":
         """Return what the piece that `raster` is of says."""
-        said = np.full(raster.distance.shape, SILENT, dtype=np.uint8)
-        said[raster.depth > p.clearance] = DENIES
-        said[raster.distance <= p.closeness] = CONFIRMS
-        return cls(raster.origin, raster.cell, said)
+        rows, columns = raster.distance.shape
+        said = np.full((rows, -(-columns // SIDE_BY_SIDE) * SIDE_BY_SIDE), SILENT, dtype=np.uint8)
+        said[:, :columns][raster.depth > p.clearance] = DENIES
+        said[:, :columns][raster.distance <= p.closeness] = CONFIRMS
+        parts = [said[:, k::SIDE_BY_SIDE] << 2 * k for k in range(SIDE_BY_SIDE)]
+        return cls(raster.origin, raster.cell, (rows, columns), np.bitwise_or.reduce(parts))
+
+    def at(self, rows: IntArray, columns: IntArray) -> NDArray[np.uint8]:
+        """Return (n,) what it says in the cells of (n,) `rows` and `columns`."""
+        four = self.said[rows, columns >> 2]
+        return np.asarray(four >> ((columns & 3) << 1).astype(np.uint8) & 3)
 
 
 def segment_confidence(
@@ -104,11 +118,11 @@ def _heard(
     back = se2.inverse(np.array([pose for _, pose in pieces]))
     origin = np.array([witness.origin for witness, _ in pieces])
     cell = np.array([[witness.cell] for witness, _ in pieces])
-    rows, columns = np.array([witness.said.shape for witness, _ in pieces]).T[:, :, None]
+    rows, columns = np.array([witness.shape for witness, _ in pieces]).T[:, :, None]
     (x, y), (c, s) = points.T, (np.cos(back[:, 2:]), np.sin(back[:, 2:]))
     i = (x * c - y * s + (back[:, :1] - origin[:, :1])) / cell
     j = (x * s + y * c + (back[:, 1:2] - origin[:, 1:])) / cell
     inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
     for k, (witness, _) in enumerate(pieces):
         known = np.flatnonzero(inside[k])
-        yield known, witness.said[i[k, known].astype(np.int64), j[k, known].astype(np.int64)]
+        yield known, witness.at(i[k, known].astype(np.int64), j[k, known].astype(np.int64))

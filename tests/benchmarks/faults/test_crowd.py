@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.faults.crowd import Heard, delays, missed
+from benchmarks.faults.crowd import Heard, delays, missed, took
 from benchmarks.faults.usage import Figures, Usage
 from mapweave_protocol.wire.messages import JointStatusMessage, MapVersion, StatusMessage
 
@@ -51,6 +51,11 @@ def test_a_map_is_in_the_first_version_that_was_begun_after_it_came() -> None:
     both = heard(said("a", 7), said("b", 0), coordinated())
     assert delays(both, [10.1, 12.0]) == pytest.approx([0.4, 1.0])
     assert delays(both, [9.0, 10.1]) == pytest.approx([2.5]), "in none yet"
+
+
+def test_how_long_versions_took_is_told_of_those_that_came() -> None:
+    both = heard(said("a", 7), said("b", 0), coordinated())
+    assert took(both, [10.1, 12.0, 13.0]) == pytest.approx([0.3, 0.5])
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ from mapweave.geometry.arrays import Float32Array, FloatArray
 from mapweave.kernels.matching import rasters
 from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap
 from mapweave.reasons import Reason
-from mapweave.team.joint_builder import JointMapBuilder
+from mapweave.team import joining
+from mapweave.team.joint_builder import JointMapBuilder, OvertakenError
 from mapweave.team.joint_optimization import JointOptimizationParameters
 from tests.mapweave.buildings import random_pose, shaken
 from tests.mapweave.team.test_joint_optimization import submaps
@@ -81,6 +82,21 @@ def assert_same(one: JointMap, other: JointMap) -> None:
         )
         assert x.cause == y.cause and x.status == y.status
         np.testing.assert_array_equal(x.transform, y.transform)
+
+
+def test_a_version_that_is_overtaken_costs_the_next_one_nothing(
+    rng: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was made for the version before is still there."""
+    maps = [robot(name, rng) for name in NAMES]
+    alignments = [aligned(maps[0], other, rng) for other in maps[1:]]
+    builder = JointMapBuilder(weaving=WEAVING)
+    before = builder.build(maps, alignments, 1)
+    with pytest.raises(OvertakenError):
+        builder.build(maps, alignments, 2, is_overtaken=lambda: True)
+    for made in ("_laid_down", "_joined"):
+        monkeypatch.delattr(joining, made)
+    assert_same(builder.build(maps, alignments, 1), before)
 
 
 def test_versions_that_compare_a_few_submaps_each_come_to_what_a_patient_one_says(

@@ -1,5 +1,6 @@
 """Robots that were joined are woven together: each submap lies where it fits all others."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -185,6 +186,25 @@ def test_what_is_not_compared_at_once_is_compared_the_next_time(frames: FloatArr
     np.testing.assert_array_equal(woven.poses["b/0"], whole.poses["b/0"])
     for name, own in where.items():
         np.testing.assert_array_equal(poses[name], own)
+
+
+def test_a_version_that_nobody_waits_for_compares_more_until_something_comes(
+    frames: FloatArray,
+) -> None:
+    cluster, robots, alignments = team(BENT, frames)
+
+    def turns(is_overtaken: Callable[[], bool] | None) -> int:
+        few = JointOptimizationParameters(newest=True, at_once=2, beside=1_000_000)
+        weaver, count = JointOptimizer(few), 0
+        while not count or (weaver.has_more and count < 4):
+            weaver.turn(is_overtaken=is_overtaken)
+            weaver.weave(cluster, robots, alignments)
+            count += 1
+        return count
+
+    assert turns(None) == 4
+    assert turns(lambda: False) == 1
+    assert turns(lambda: True) == 4
 
 
 def test_a_patient_version_leaves_nothing_to_the_next_one(frames: FloatArray) -> None:
