@@ -8,7 +8,10 @@ import mapweave
 
 if len(sys.argv) != 3:
     raise SystemExit("usage: python compare_two_maps.py A.json B.json")
-reference, other = (mapweave.load(path) for path in sys.argv[1:])
+try:
+    reference, other = (mapweave.load(path) for path in sys.argv[1:])
+except mapweave.MapweaveError as error:  # one line that names the file
+    raise SystemExit(f"{error}") from error
 if not (isinstance(reference, mapweave.RobotMap) and isinstance(other, mapweave.RobotMap)):
     raise SystemExit("expected the maps of two robots, got a joint map")
 

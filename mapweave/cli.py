@@ -10,6 +10,7 @@ import ast
 import errno
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -37,6 +38,7 @@ EXIT_INTERRUPTED = 130
 INTERRUPTED = "mapweave: interrupted"
 STANDARD_ERROR = 2
 NO_ROOM = {errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO}
+_NEGATIVE_PLACE = re.compile(r"-[0-9.]+(,-?[0-9.]+)+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,10 +200,21 @@ def _run(words: list[str]) -> int:
     with _ended_at_once():
         command: Command = points[words[0]].load()
         parser = parser_of(words[0], command)
-    options = parser.parse_args(words[1:])
+    options = parser.parse_args(_places_joined(words[1:]))
     if told := missing():
         print(f"mapweave: {told}", file=sys.stderr)  # noqa: T201
     return command.run(options)
+
+
+def _places_joined(words: list[str]) -> list[str]:
+    """Return `words`, a place such as -3.5,1 one word with its option: it looks like an option."""
+    joined = list[str]()
+    for word in words:
+        if joined and joined[-1].startswith("--") and _NEGATIVE_PLACE.fullmatch(word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 @contextmanager

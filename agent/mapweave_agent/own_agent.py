@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike
 
 from mapweave.commands.starting import Start
 from mapweave.config import Config
-from mapweave.errors import ArgumentError
+from mapweave.errors import ArgumentError, MapweaveError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id
 from mapweave.mapping.localization.known_map import KnownMap
 from mapweave.maps import JointMap, RobotMap
-from mapweave.scan.scan import Scan
+from mapweave.scan.scan import Scan, check_beams
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.by_hand.own_marks import Frame, checked
 from mapweave_agent.comparison_worker import ComparisonWorker
@@ -31,9 +31,9 @@ from mapweave_protocol.link.security.membership import check_member
 from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session
-from mapweave_protocol.link.subscriber import joint_maps, poses
+from mapweave_protocol.link.subscriber import alignments, joint_maps, poses
 from mapweave_protocol.wire.keys import new_boot
-from mapweave_protocol.wire.messages import PoseMessage
+from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage
 
 T = TypeVar("T")
 
@@ -58,6 +58,9 @@ class Agent:
     on_pose
         Called with where each robot of the team is, this one included, at the rate of its scans,
         in a thread of its own; where it takes longer, with the newest of each.
+    on_alignment
+        Called with what was found out about each pair of the team's maps, this robot's or not:
+        how one lies in the other, or why that is not known; in a thread of its own.
     patience
         How long the router is tried [s]; None for as long as it takes.
     state
@@ -93,6 +96,7 @@ class Agent:
         config: Config | None = None,
         on_joint_map: Callable[[JointMap], None] | None = None,
         on_pose: Callable[[PoseMessage], None] | None = None,
+        on_alignment: Callable[[AlignmentMessage], None] | None = None,
         patience: float | None = None,
         state: str | Path | None = None,
         continued: RobotMap | None = None,
@@ -106,6 +110,7 @@ class Agent:
         self._config = Config() if config is None else config
         self._on_joint_map = on_joint_map
         self._on_pose = on_pose
+        self._on_alignment = on_alignment
         self._patience = patience
         self._state = None if state is None else Path(state)
         place = None if localize_in is None else KnownMap.of(localize_in)
@@ -114,6 +119,7 @@ class Agent:
         self._leaving = threading.Event()
         self._failure: BaseException | None = None
         self._fed = 0
+        self._within = False  # its block
         self._opened = ExitStack()
 
     @property
@@ -141,15 +147,18 @@ class Agent:
         range_min: float = 0.0,
         range_max: float = math.inf,
         time_increment: float = 0.0,
+        odometry: ArrayLike | None = None,
     ) -> None:
         """Hand over a scan; returns at once. Parameters as of `mapweave.Scan.of`.
+
+        Odometry is one more guess of where the robot has got to; what was seen decides.
 
         Raises
         ------
         ArgumentError
-            If it is no scan.
+            If it is no scan, or one of few beams.
         MapweaveError
-            If the agent has failed.
+            If the agent has failed, or outside of its block.
         """
         self._check_running()
         scan = Scan.of(
@@ -161,9 +170,10 @@ class Agent:
             index=self._fed,
             stamp=stamp,
             time_increment=time_increment,
+            odometry=odometry,
         )
+        self._scans.put(check_beams(scan))
         self._fed += 1
-        self._scans.put(scan)
 
     def mark(self, label: str, x: float, y: float, *, frame: Frame = "map") -> str:
         """Mark a place, such as a victim, on the robot's map; return the mark's id.
@@ -216,6 +226,7 @@ class Agent:
             self._threads.append(threading.Thread(target=listen))
         for thread in self._threads:
             thread.start()
+        self._within = True
         return self
 
     def __exit__(
@@ -225,6 +236,7 @@ class Agent:
         trace: TracebackType | None,
     ) -> None:
         """Finish the map, publish it and leave; at once where the block failed."""
+        self._within = False
         if error is not None:
             self._leaving.set()
         self._scans.close()
@@ -232,7 +244,7 @@ class Agent:
             thread.join()
         self._opened.close()
         if error is None:
-            self._check_running()
+            self._check_failure()
 
     def _open(self, stack: ExitStack) -> AgentRun:
         link = LinkSettings.of_environment()
@@ -273,11 +285,18 @@ class Agent:
             yield partial(self._listen, joint_maps, self._on_joint_map)
         if self._on_pose is not None:
             yield partial(self._listen, poses, self._on_pose)
+        if self._on_alignment is not None:
+            yield partial(self._listen, alignments, self._on_alignment)
 
     def _listen(self, subscribe: Callable[..., Iterator[T]], tell: Callable[[T], None]) -> None:
         for heard in subscribe(self._team, connect=self._endpoints, stopping=self._leaving.is_set):
             tell(heard)
 
     def _check_running(self) -> None:
+        self._check_failure()
+        if not self._within:
+            raise MapweaveError("an agent is used within its block: with Agent(...) as agent:")
+
+    def _check_failure(self) -> None:
         if self._failure is not None:
             raise self._failure

@@ -21,6 +21,9 @@ MAX_STAMP = 1e11
 LONGEST_SWEEP = 1.0
 """[s]; no lidar turns slower."""
 
+MIN_BEAMS = 10
+"""Of a live scan; fewer show no wall."""
+
 _TURN = 2 * math.pi
 _LAST_INDEX = 2**53  # that a file holds
 
@@ -162,6 +165,13 @@ class Scan:
         bearing = np.column_stack([np.cos(self.angles), np.sin(self.angles)])
         points: FloatArray = self.ranges[:, None] * bearing
         return points
+
+
+def check_beams(scan: Scan) -> Scan:
+    """Return `scan`; ArgumentError if it has fewer than `MIN_BEAMS` beams."""
+    if len(scan.ranges) < MIN_BEAMS:
+        raise ArgumentError("ranges", f"expected {MIN_BEAMS} beams or more, got {len(scan.ranges)}")
+    return scan
 
 
 def _span(range_min: float, range_max: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ HUMBLE = "humble"
 """The release that knows no hashes of types."""
 
 _NUMBER = re.compile(r"[0-9]{1,3}")
-_RELEASE = re.compile(r"[a-z]{1,32}")
+RELEASES = (HUMBLE, "iron", "jazzy", "kilted", "lyrical", "rolling")
 _SETTINGS = {"connect", "domain", "distro"}
 
 
@@ -76,6 +76,6 @@ class Ros2Network:
         if not _NUMBER.fullmatch(domain) or int(domain) > MAX_DOMAIN:
             raise Ros2NetworkError(word, f"domain {domain!r} is no number from 0 to {MAX_DOMAIN}")
         release = settings.get("distro", "jazzy")
-        if not _RELEASE.fullmatch(release):
-            raise Ros2NetworkError(word, f"distro {release!r} is no release such as jazzy")
+        if release not in RELEASES:
+            raise Ros2NetworkError(word, f"distro {release!r} is none of {', '.join(RELEASES)}")
         return cls(reached, int(domain), hashed=release != HUMBLE)

@@ -10,11 +10,10 @@ from mapweave.io.readers.ros_bags.laser_messages import (
     Message,
     UnreadableMessageError,
 )
-from mapweave.scan.scan import Scan
+from mapweave.scan.scan import MIN_BEAMS, Scan
 from mapweave_ros.topics import DDS_LASER_SCAN
 
 MAX_BYTES = 2**20  # of a message: ten thousand beams and their intensities are a tenth of it
-MIN_BEAMS = 10  # fewer show no wall
 NOISE = (AssertionError, TypeError, MemoryError)  # what rosbags makes of it
 
 

@@ -8,14 +8,16 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from queue import SimpleQueue
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 import mapweave_agent
-from mapweave.errors import ArgumentError, FileError, InvalidIdError
+from mapweave.errors import ArgumentError, FileError, InvalidIdError, MapweaveError
 from mapweave.io.map_files import read_map
 from mapweave.io.readers import read_scans
 from mapweave.mapping.mapper import Mapper
@@ -27,7 +29,7 @@ from mapweave_agent.publication_schedule import AgentParameters, PublicationSche
 from mapweave_protocol.errors import UnreachableError
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.wire.coding.trajectory_code import PER_METRE
-from mapweave_protocol.wire.messages import PoseMessage
+from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage
 from tests.agent.test_agent import MAPWEAVE, PATIENCE, SCANS, Listener
 
 HALF_A_STEP = 0.501 / PER_METRE  # [m] of the poses of scans on the wire
@@ -303,11 +305,41 @@ def test_what_fails_beside_the_mapping_ends_the_agent(
 
 
 def test_what_is_no_scan_is_refused_where_it_is_fed(endpoint: str, team: str) -> None:
+    with mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE) as agent:
+        with pytest.raises(ArgumentError, match="angle_increment"):
+            agent.feed([1.0] * 10, 0.0, 0.0)
+        with pytest.raises(ArgumentError, match="ranges: expected 10 beams or more, got 9"):
+            agent.feed([1.0] * 9, 0.0, 0.1)
+
+
+def test_an_agent_is_used_within_its_block_only(endpoint: str, team: str) -> None:
+    agent = mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE)
+    for use in (partial(agent.feed, [1.0] * 10, 0.0, 0.1), partial(agent.mark, "victim", 0.0, 0.0)):
+        with pytest.raises(MapweaveError, match="within its block"):
+            use()
+    with agent:
+        agent.feed([1.0] * 10, 0.0, 0.1)
+    with pytest.raises(MapweaveError, match="within its block"):
+        agent.feed([1.0] * 10, 0.0, 0.1)
+
+
+def test_a_program_is_told_how_its_team_s_maps_lie_in_each_other(
+    endpoint: str, team: str, logs: list[Path]
+) -> None:
+    told = SimpleQueue[AlignmentMessage]()
     with (
-        mapweave_agent.Agent("a", team, connect=endpoint, patience=PATIENCE) as agent,
-        pytest.raises(ArgumentError, match="angle_increment"),
+        mapweave_agent.Agent(
+            "a", team, connect=endpoint, patience=PATIENCE, on_alignment=told.put
+        ) as a,
+        mapweave_agent.Agent("b", team, connect=endpoint, patience=PATIENCE) as b,
     ):
-        agent.feed([1.0, 2.0], 0.0, 0.0)
+        for agent, log in zip((a, b), logs, strict=False):
+            for scan in scans_of(log):
+                agent.feed(scan.ranges, scan.angles[0], scan.angles[1] - scan.angles[0], scan.stamp)
+                while agent.waiting:
+                    time.sleep(0.002)
+        heard = told.get(timeout=PATIENCE)
+    assert {heard.reference.robot, heard.other.robot} == {"a", "b"}
 
 
 def test_a_block_that_fails_ends_the_agent_at_once(endpoint: str, team: str) -> None:

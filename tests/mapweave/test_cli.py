@@ -249,6 +249,21 @@ def test_the_status_a_command_returns_is_the_programs(offer: Callable[[str], Non
     assert main(["try"]) == 3
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["mark", "r1", "victim", "--at", "-3.5,1"],
+        ["mark", "r1", "victim", "--at=-3.5,-1"],
+        ["pin", "r1/0", "r2/0", "--transform", "-3,.5,-90"],
+    ],
+)
+def test_a_place_that_begins_with_a_minus_is_no_option(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, "--connect", "nowhere"]) == cli.EXIT_FAILED
+    assert "endpoint nowhere: expected" in capsys.readouterr().err
+
+
 def test_errors_carry_what_they_are_about() -> None:
     error = FileError("a/b.json", "is empty")
     assert (error.path, error.problem) == (Path("a/b.json"), "is empty")

@@ -39,7 +39,8 @@ def test_a_word_says_network_domain_and_where_each_laser_sits() -> None:
         ("ros2:/a@0,0,0+/a@0,0,0", "names a topic twice"),
         ("ros2:/a?domain=233", "domain '233' is no number from 0 to 232"),
         ("ros2:/a?domain=", "domain ''"),
-        ("ros2:/a?distro=22.04", "distro '22.04' is no release"),
+        ("ros2:/a?distro=22.04", "distro '22.04' is none of humble"),
+        ("ros2:/a?distro=humbel", "distro 'humbel' is none of humble"),
         ("ros2:/a?router=tcp/a:1", "nothing is known of 'router'"),
     ],
 )

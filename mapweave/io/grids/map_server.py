@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 
 from mapweave.errors import FileError, MissingExtraError
 from mapweave.geometry.arrays import BoolArray, FloatArray
@@ -37,6 +44,14 @@ class _Settings(BaseModel):
     negate: bool = False
     occupied_thresh: _Share = 0.65
     free_thresh: _Share = 0.25
+
+    @field_validator("free_thresh")
+    @classmethod
+    def _check_order(cls, value: float, known: ValidationInfo) -> float:
+        occupied = known.data.get("occupied_thresh", 1.0)
+        if value > occupied:
+            raise ValueError(f"expected no more than occupied_thresh, {occupied}, got {value}")
+        return value
 
 
 def is_grid(path: Path) -> bool:
@@ -102,8 +117,12 @@ def _shades(path: Path) -> tuple[FloatArray, BoolArray]:
                     f" {MOST_CELLS} cells",
                 )
             return _pixels(image)
+    except FileNotFoundError as error:
+        raise FileError(path, "no such file; image of the settings names it") from error
     except (OSError, UnidentifiedImageError, SyntaxError, ValueError) as error:
-        raise FileError(path, "is no picture; expected PGM, PNG or another of a grid") from error
+        raise FileError(
+            path, "is no picture, or cut off; expected PGM, PNG or another of a grid"
+        ) from error
 
 
 def _pixels(image: "Image") -> tuple[FloatArray, BoolArray]:

@@ -146,12 +146,20 @@ def alignments(
     connect: Sequence[str] | None = None,
     timeout: float | None = None,
     since: int | None = None,
+    stopping: Callable[[], bool] = lambda: False,
     link: LinkSettings | None = None,
 ) -> Iterator[AlignmentMessage]:
-    """Yield what the robots find out about pairs of maps; as for `robot_maps`."""
+    """Yield what the robots find out about pairs of maps; as for `robot_maps`.
+
+    Where `stopping` says so, asked now and then, it ends.
+    """
     _check_since(since)
+
+    def read(reader: Reader[M], get: Callable[[float], Arrival | None]) -> Iterator[M | None]:
+        return takewhile(lambda _: not stopping(), _read(reader, get, timeout))
+
     with _listening(ALIGNMENT.pattern(team=team), connect, timeout, 1, link) as opened:
-        yield from replicated_alignments(*opened, team, since, partial(_read, timeout=timeout))
+        yield from replicated_alignments(*opened, team, since, read)
 
 
 def statuses(

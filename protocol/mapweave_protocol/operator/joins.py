@@ -40,8 +40,7 @@ def _configure(parser: argparse.ArgumentParser, kind: OrderKind) -> None:
         "--transform",
         metavar="X,Y,DEGREES",
         type=argument(transform),
-        help=f"where B lies in the frame of A [m, m, °] (default {anything[kind]});"
-        " one that begins with a minus is written --transform=-3,1,90",
+        help=f"where B lies in the frame of A [m, m, °] (default {anything[kind]})",
     )
     add_reason_argument(parser)
     add_order_arguments(parser, f"what was {_DONE[kind]} between the two")

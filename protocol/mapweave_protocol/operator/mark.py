@@ -33,8 +33,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         "--at",
         metavar="SCAN|X,Y",
         type=argument(scan_or_place),
-        help="where the robot was at a scan, or a place in the frame of its own map [m]; one that"
-        " begins with a minus is written --at=-3.5,1",
+        help="where the robot was at a scan, or a place in the frame of its own map [m]",
     )
     add_order_arguments(parser, "the marks of this label that operators made on this robot's map")
 

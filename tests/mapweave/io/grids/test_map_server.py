@@ -119,6 +119,7 @@ def test_the_frame_is_that_of_the_settings(tmp_path: Path) -> None:
         (SETTINGS.replace("[-1.0, 2.0, 0.5]", "[1]"), ["origin"]),
         (SETTINGS + "mode: quaternary\n", ["mode", "trinary"]),
         (SETTINGS + "free_thresh: 3\n", ["free_thresh"]),
+        (SETTINGS + "free_thresh: 0.7\n", ["free_thresh", "occupied_thresh, 0.65, got 0.7"]),
         ("image: !!python/object:os.system map.pgm\n", ["expected"]),
     ],
 )
@@ -147,7 +148,7 @@ def test_a_missing_picture_and_one_too_large_are_named(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"80001 by 1001 cells; expected no more"):
         read_grid(path)
     (tmp_path / "map.pgm").unlink()
-    with pytest.raises(FileError, match=r"map\.pgm"):
+    with pytest.raises(FileError, match=r"map\.pgm: no such file; image of the settings names it"):
         read_grid(path)
 
 
