@@ -112,8 +112,8 @@ inline Out<float> window_scores(In<double, 2> points, In<float, 2> field, In<dou
     for (int64_t i = 0; i < n; ++i) {
       const double* p = points.data() + 2 * i;
       Voter& voter = voters[i];
-      voter.column = static_cast<int64_t>(std::floor((c * p[0] - sn * p[1]) / cell));
-      voter.row = static_cast<int64_t>(std::floor((sn * p[0] + c * p[1]) / cell));
+      voter.column = floor_of((c * p[0] - sn * p[1]) / cell);
+      voter.row = floor_of((sn * p[0] + c * p[1]) / cell);
       voter.offset = stride ? strided.offset(voter.row + base[1]) : 0;
     }
     for (int64_t a = 0; a < s; ++a) {

@@ -411,7 +411,7 @@ class PointMap {
     return dx * dx + dy * dy + (du * du + dv * dv);
   }
 
-  int64_t index(double value) const { return static_cast<int64_t>(std::floor(value / cell_)); }
+  int64_t index(double value) const { return floor_of(value / cell_); }
   size_t cell_of(double x, double y) const {
     return static_cast<size_t>((index(x) - left_) * rows_ + (index(y) - low_));
   }
