@@ -4,6 +4,7 @@ Words and formats: a *segment* is directed, its visible side on the left of its 
 *submap* has a frame of its own; a *component* is a set of submaps whose relative pose is known.
 """
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -125,13 +126,11 @@ class LineMap:
 
     def moved(self, pose: FloatArray) -> "LineMap":
         """Return this map, given in the frame at `pose` (3,), in that frame's parent."""
-        turned, shift = se2.rotation(pose[2]).T, pose[:2]  # once, for all the rings
-        return LineMap(
-            se2.transform_segments(pose, self.segments),
-            self.polyline,
-            self.support,
-            tuple([ring @ turned + shift for ring in self.free_space]),
-        )
+        corners = np.concatenate([self.segments.reshape(-1, 2), *self.free_space])
+        moved = se2.transform_points(pose, corners)  # all at once
+        ends = list(itertools.accumulate(map(len, self.free_space), initial=2 * len(self.segments)))
+        rings = tuple([moved[a:b] for a, b in itertools.pairwise(ends)])
+        return LineMap(moved[: ends[0]].reshape(-1, 4), self.polyline, self.support, rings)
 
     @property
     def polylines(self) -> list[FloatArray]:

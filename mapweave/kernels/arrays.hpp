@@ -23,6 +23,12 @@
 
 namespace nb = nanobind;
 
+// The greatest whole number not above a number: `std::floor` is a call where registers are narrow.
+inline int64_t floor_of(double value) {
+  const int64_t whole = static_cast<int64_t>(value);
+  return whole - (value < static_cast<double>(whole));
+}
+
 template <typename T, int N>
 using In = nb::ndarray<const T, nb::ndim<N>, nb::c_contig, nb::device::cpu>;
 

@@ -50,25 +50,45 @@ inline int64_t stride_of(const std::vector<int64_t>& base) {
   return base[3] - base[1];
 }
 
-// The field's lines with every `stride`-th cell side by side: what a row of shifts looks up.
+// The field's lines with every `stride`-th cell side by side: what a row of shifts looks up. Before and after each line
+// go on as many cells as a row has, that say what its last one says: so no row of shifts ends outside.
 class Strided {
  public:
-  Strided(const float* field, int64_t side, int64_t stride)
-      : side_(side), stride_(stride), run_((side + stride - 1) / stride),
-        cells_(static_cast<size_t>(side * stride * run_), 0.0f) {
+  Strided(const float* field, int64_t side, int64_t stride, int64_t count)
+      : stride_(stride), before_(count * stride), last_(side), run_((side + stride - 1) / stride + 2 * count + 1),
+        cells_(static_cast<size_t>(side * stride * run_)) {
     for (int64_t i = 0; i < side; ++i)
       for (int64_t phase = 0; phase < stride; ++phase) {
         float* to = cells_.data() + (i * stride + phase) * run_;
+        std::fill(to, to + run_, field[i * side + side - 1]);
+        to += count;
         for (int64_t j = phase; j < side; j += stride) *to++ = field[i * side + j];
       }
   }
 
-  // From cell j of line i on; j is in the field.
-  const float* from(int64_t i, int64_t j) const { return cells_.data() + (i * stride_ + j % stride_) * run_ + j / stride_; }
+  // How far from a line's beginning on the row of shifts is that begins at cell `j`, wherever that is.
+  int64_t offset(int64_t j) const {
+    const int64_t from = std::clamp(j, -before_, last_) + before_;
+    return from % stride_ * run_ + from / stride_;
+  }
+  const float* line(int64_t i) const { return cells_.data() + i * stride_ * run_; }
 
  private:
-  int64_t side_, stride_, run_;
+  int64_t stride_, before_, last_, run_;
   std::vector<float> cells_;
+};
+
+constexpr int kTogether = 4;  // points whose rows are added in one go
+
+// Adds four rows to the sums, one after the other: what comes of it is what adding each by itself gives.
+MAPWEAVE_WIDE inline void add_rows(float* __restrict sums, const float* const rows[kTogether], int64_t count) {
+  const float *r0 = rows[0], *r1 = rows[1], *r2 = rows[2], *r3 = rows[3];
+  for (int64_t b = 0; b < count; ++b) sums[b] = (((sums[b] + r0[b]) + r1[b]) + r2[b]) + r3[b];
+}
+
+// A turned point's cell, and where its row of shifts begins in a line.
+struct Voter {
+  int64_t column, row, offset;
 };
 
 // (t, s, s) summed nearness of the points, turned by each of t turns and moved by each pair of s shifts.
@@ -83,33 +103,31 @@ inline Out<float> window_scores(In<double, 2> points, In<float, 2> field, In<dou
     for (int64_t a = 0; a < 2; ++a)
       base[2 * k + a] = static_cast<int64_t>(std::nearbyint((shifts.data()[2 * k + a] - origin.data()[a]) / cell));
   std::vector<float> scores(static_cast<size_t>(t * s * s), 0.0f);
-  std::vector<int64_t> rows(static_cast<size_t>(s));
   const int64_t stride = t * n >= kMany ? stride_of(base) : 0;
-  const Strided strided(field.data(), stride ? outside + 1 : 0, stride ? stride : 1);
+  const Strided strided(field.data(), stride ? outside + 1 : 0, stride ? stride : 1, stride ? s : 0);
+  const auto inside = [&](int64_t at) { return at < 0 || at > outside ? outside : at; };
+  std::vector<Voter> voters(static_cast<size_t>(n));
   for (int64_t k = 0; k < t; ++k) {
     const double c = std::cos(turns.data()[k]), sn = std::sin(turns.data()[k]);
-    float* out = scores.data() + k * s * s;
     for (int64_t i = 0; i < n; ++i) {
       const double* p = points.data() + 2 * i;
-      const int64_t column = static_cast<int64_t>(std::floor((c * p[0] - sn * p[1]) / cell));
-      const int64_t row = static_cast<int64_t>(std::floor((sn * p[0] + c * p[1]) / cell));
-      const int64_t first = row + base[1];
-      const bool inside = stride && first >= 0 && first + (s - 1) * stride <= outside;
-      for (int64_t b = 0; b < s && !inside; ++b) {
-        const int64_t j = row + base[2 * b + 1];
-        rows[b] = j < 0 || j > outside ? outside : j;
+      Voter& voter = voters[i];
+      voter.column = floor_of((c * p[0] - sn * p[1]) / cell);
+      voter.row = floor_of((sn * p[0] + c * p[1]) / cell);
+      voter.offset = stride ? strided.offset(voter.row + base[1]) : 0;
+    }
+    for (int64_t a = 0; a < s; ++a) {
+      float* sums = scores.data() + (k * s + a) * s;
+      int64_t i = 0;
+      for (; stride && i + kTogether <= n; i += kTogether) {
+        const float* rows[kTogether];
+        for (int e = 0; e < kTogether; ++e)
+          rows[e] = strided.line(inside(voters[i + e].column + base[2 * a])) + voters[i + e].offset;
+        add_rows(sums, rows, s);
       }
-      for (int64_t a = 0; a < s; ++a) {
-        const int64_t at = column + base[2 * a];
-        const int64_t line_number = at < 0 || at > outside ? outside : at;
-        float* sums = out + a * s;
-        if (inside) {
-          const float* run = strided.from(line_number, first);
-          for (int64_t b = 0; b < s; ++b) sums[b] += run[b];
-          continue;
-        }
-        const float* line = field.data() + line_number * (outside + 1);
-        for (int64_t b = 0; b < s; ++b) sums[b] += line[rows[b]];
+      for (; i < n; ++i) {
+        const float* line = field.data() + inside(voters[i].column + base[2 * a]) * (outside + 1);
+        for (int64_t b = 0; b < s; ++b) sums[b] += line[inside(voters[i].row + base[2 * b + 1])];
       }
     }
   }

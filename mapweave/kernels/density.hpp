@@ -17,7 +17,7 @@ inline uint64_t bits(int64_t first, int64_t last) {
 }
 
 inline int64_t place(double along, double radius) {
-  return std::clamp<int64_t>(static_cast<int64_t>(std::floor((along / radius + 1) * 32)), 0, 64);
+  return static_cast<int64_t>(std::clamp((along / radius + 1) * 32, 0.0, 64.0));
 }
 
 inline int64_t count_bits(uint64_t word) {

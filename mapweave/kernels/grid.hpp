@@ -66,8 +66,8 @@ class Grid {
   template <typename F>
   double around(double x, double y, int64_t ring, F&& use) const {
     if (!order_.empty()) {
-      const int64_t column = static_cast<int64_t>(std::floor((x - low_[0]) / cell_));
-      const int64_t row = static_cast<int64_t>(std::floor((y - low_[1]) / cell_));
+      const int64_t column = floor_of((x - low_[0]) / cell_);
+      const int64_t row = floor_of((y - low_[1]) / cell_);
       for (int64_t j = std::max<int64_t>(row - ring, 0); j <= std::min(row + ring, size_[1] - 1); ++j) {
         const int64_t step = j == row - ring || j == row + ring || ring == 0 ? 1 : 2 * ring;
         for (int64_t i = column - ring; i <= column + ring; i += step) {

@@ -6,6 +6,7 @@
 #include "denials.hpp"
 #include "density.hpp"
 #include "evidence.hpp"
+#include "judging.hpp"
 #include "main_directions.hpp"
 #include "marks.hpp"
 #include "merging.hpp"
@@ -21,6 +22,7 @@
 #include "range_coder.hpp"
 #include "raster_icp.hpp"
 #include "rasters.hpp"
+#include "sampling.hpp"
 #include "scores.hpp"
 #include "segmentation.hpp"
 #include "shape_index.hpp"
@@ -40,6 +42,7 @@ NB_MODULE(_compiled, m) {
   bind_denials(m);
   bind_density(m);
   bind_evidence(m);
+  bind_judging(m);
   bind_main_directions(m);
   bind_marks(m);
   bind_merging(m);
@@ -54,6 +57,7 @@ NB_MODULE(_compiled, m) {
   bind_range_coder(m);
   bind_raster_icp(m);
   bind_rasters(m);
+  bind_sampling(m);
   bind_scores(m);
   bind_segmentation(m);
   bind_shape_index(m);

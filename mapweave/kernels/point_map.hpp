@@ -64,10 +64,19 @@ MAPWEAVE_WIDE inline LeastTwo least_two(const Four* fours, size_t count, double 
   return {least[best], other, 4 * static_cast<size_t>(place[best]) + static_cast<size_t>(best)};
 }
 
-// The points of a cell of the grid, and the same by fours.
+// The points of a cell of the grid, the same by fours, and between which numbers those are, in place and normal.
 struct Cell {
   std::vector<Point> points;
   std::vector<Four> fours;
+  Wide low = Wide{} + std::numeric_limits<double>::infinity(), high = -low;
+
+  // [m²] squared distance below which no point is: walls that face another way are far, however near they lie.
+  double least_possible(const Wide& at) const {
+    const Wide below = low - at, above = at - high, most = below > above ? below : above;
+    const Wide gap = most > 0.0 ? most : Wide{};
+    const Wide squared = gap * gap;
+    return squared[0] + squared[1] + (squared[2] + squared[3]);
+  }
 
   LeastTwo least_two(double x, double y, double u, double v) const {
     return point_map::least_two(fours.data(), fours.size(), x, y, u, v);
@@ -87,6 +96,11 @@ struct Cell {
   // Lays the points from one on out anew.
   void lay_out(size_t first) {
     fours.resize((points.size() + 3) / 4);
+    low = Wide{} + std::numeric_limits<double>::infinity(), high = -low;
+    for (const Point& point : points) {
+      const Wide at = {point.x, point.y, point.u, point.v};
+      low = at < low ? at : low, high = at > high ? at : high;
+    }
     for (size_t k = first; k < 4 * fours.size(); ++k) {
       Four& four = fours[k / 4];
       const Point point = k < points.size() ? points[k] : Point{std::numeric_limits<double>::infinity()};  // or none
@@ -396,7 +410,7 @@ class PointMap {
     return dx * dx + dy * dy + (du * du + dv * dv);
   }
 
-  int64_t index(double value) const { return static_cast<int64_t>(std::floor(value / cell_)); }
+  int64_t index(double value) const { return floor_of(value / cell_); }
   size_t cell_of(double x, double y) const {
     return static_cast<size_t>((index(x) - left_) * rows_ + (index(y) - low_));
   }
@@ -503,8 +517,7 @@ class PointMap {
     if (columns * rows * 2 < columns_ * rows_) lay_out(left_ + first - kMargin, low_ + lowest - kMargin, columns, rows);
   }
 
-  // Calls `visit` with each cell of the ring of cells `r` away from (i, j) that may hold a point, and the number of
-  // its column and row.
+  // Calls `visit` with each cell of the ring of cells `r` away from (i, j) that may hold a point.
   template <typename Visit>
   void ring(int64_t i, int64_t j, int64_t r, Visit&& visit) const {
     const int64_t a0 = std::max(i - r, left_), a1 = std::min(i + r, left_ + columns_ - 1);
@@ -514,18 +527,12 @@ class PointMap {
       const uint8_t* empty = empty_.data() + (a - left_) * rows_ - low_;
       if (a == i - r || a == i + r) {
         for (int64_t b = b0; b <= b1; b += std::max<int64_t>(1, empty[b]))
-          if (!empty[b]) visit(cells_[place[b]], a, b);
+          if (!empty[b]) visit(cells_[place[b]]);
       } else {
-        if (j - r >= low_ && j - r < low_ + rows_ && !empty[j - r]) visit(cells_[place[j - r]], a, j - r);
-        if (r > 0 && j + r >= low_ && j + r < low_ + rows_ && !empty[j + r]) visit(cells_[place[j + r]], a, j + r);
+        if (j - r >= low_ && j - r < low_ + rows_ && !empty[j - r]) visit(cells_[place[j - r]]);
+        if (r > 0 && j + r >= low_ && j + r < low_ + rows_ && !empty[j + r]) visit(cells_[place[j + r]]);
       }
     }
-  }
-
-  // [m] how far `value` is from the cells of one number, in one coordinate; rounded down.
-  double gap_to(double value, int64_t number) const {
-    const double before = number * cell_ - value, after = value - (number + 1) * cell_;
-    return std::max(0.0, std::max(before, after) - kRounding);
   }
 
   const Point* nearest(double x, double y, double u, double v, double reach) const {
@@ -537,6 +544,7 @@ class PointMap {
     const double inner = std::min(std::min(x - i * cell_, (i + 1) * cell_ - x),
                                   std::min(y - j * cell_, (j + 1) * cell_ - y));
     double best = reach * reach, next = std::numeric_limits<double>::infinity();
+    const Wide at = {x, y, u, v};
     const Point* found = nullptr;
     if (guess) {
       const double d = squared(*guess, x, y, u, v);
@@ -556,8 +564,8 @@ class PointMap {
         next = std::min(next, gap * gap);
         break;
       }
-      ring(i, j, r, [&](const Cell& here, int64_t a, int64_t b) {
-        const double gap_x = gap_to(x, a), gap_y = gap_to(y, b), nearest_here = gap_x * gap_x + gap_y * gap_y;
+      ring(i, j, r, [&](const Cell& here) {
+        const double nearest_here = here.least_possible(at);
         if (nearest_here > best) {
           next = std::min(next, nearest_here);
           return;
@@ -589,13 +597,16 @@ class PointMap {
 
   bool any_within(double x, double y, double u, double v, double reach) const {
     const double limit = reach * reach;
+    const Wide at = {x, y, u, v};
     const double wide = std::min(reach, 1e9 * cell_) + kRounding;
     const int64_t i0 = std::max(index(x - wide), left_), i1 = std::min(index(x + wide), left_ + columns_ - 1);
     const int64_t j0 = std::max(index(y - wide), low_), j1 = std::min(index(y + wide), low_ + rows_ - 1);
     for (int64_t i = i0; i <= i1; ++i)
       for (int64_t j = j0; j <= j1; ++j) {
         const int32_t place = place_[static_cast<size_t>((i - left_) * rows_ + (j - low_))];
-        if (place >= 0 && cells_[place].least_two(x, y, u, v).least < limit) return true;
+        if (place < 0) continue;
+        const Cell& here = cells_[place];
+        if (here.least_possible(at) < limit && here.least_two(x, y, u, v).least < limit) return true;
       }
     return false;
   }

@@ -186,6 +186,16 @@ inline void fit(const double* a, const double* b, size_t samples, double rotatio
   peaks.residual.push_back(std::sqrt(squares / static_cast<double>(samples)));
 }
 
+// The squared similarities of a row of pairs; -1 for those that are too little alike, most of them: without a root.
+MAPWEAVE_WIDE inline void square(double* __restrict squared, const double* __restrict product, double straight,
+                                 const double* __restrict others, double least, double min_gain, size_t count) {
+  for (size_t j = 0; j < count; ++j) {
+    const double re = product[2 * j], im = product[2 * j + 1], sum = re * re + im * im;
+    const double more = std::max(straight, others[j]) + min_gain - 2 * kRounding, bound = std::max(more, 0.0);
+    squared[j] = (sum >= least) & (sum >= bound * bound) ? sum : -1.0;
+  }
+}
+
 inline std::tuple<Out<int64_t>, Out<int64_t>, Out<double>, Out<double>, Out<double>, Out<double>> alike_windows(
     In<double, 3> product, In<double, 1> straight, In<double, 1> other_straight, In<int64_t, 1> place,
     In<int64_t, 1> other_place, In<double, 3> points, In<double, 3> other_points, double min_similarity,
@@ -200,18 +210,19 @@ inline std::tuple<Out<int64_t>, Out<int64_t>, Out<double>, Out<double>, Out<doub
   const double least = min_similarity * min_similarity;
   std::vector<double> gain(rows * columns, kOut);
   std::vector<size_t> found;
-  for (size_t i = 0; i < rows; ++i)
+  std::vector<double> squared(columns);
+  for (size_t i = 0; i < rows; ++i) {
+    const double* row = product.data() + 2 * i * columns;
+    square(squared.data(), row, straight(i), other_straight.data(), least, min_gain, columns);
     for (size_t j = 0; j < columns; ++j) {
-      const double re = product(i, j, 0), im = product(i, j, 1), squared = re * re + im * im;
-      if (!(squared >= least)) continue;
-      const double straighter = std::max(straight(i), other_straight(j));
-      if (std::sqrt(squared) - straighter < min_gain - kRounding) continue;  // most of them: without hypot
-      const double similarity = std::min(std::hypot(re, im), 1.0);
-      const double more = similarity - straighter;
+      if (!(squared[j] >= 0)) continue;
+      const double similarity = std::min(std::hypot(row[2 * j], row[2 * j + 1]), 1.0);
+      const double more = similarity - std::max(straight(i), other_straight(j));
       if (!(more > min_gain)) continue;
       gain[i * columns + j] = std::nearbyint(more * 1e9) / 1e9;
       found.push_back(i * columns + j);
     }
+  }
   const auto beside = [&](size_t i, size_t j, int down, int right) {
     const size_t r = i + down, c = j + right;  // wraps below 0: then it is beyond the last as well
     if (r >= rows || c >= columns || place(r) != place(i) + down || other_place(c) != other_place(j) + right)

@@ -1,43 +1,28 @@
-// What samples find in a raster: ICP of many starts, and verification. The twins and the words are in
-// matching/raster_icp.py and matching/judging.py.
+// ICP of many starts in a raster. The twin and the words are in matching/raster_icp.py.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <tuple>
-#include <utility>
 #include <vector>
 
 #include "arrays.hpp"
+#include "judging.hpp"
 
 namespace raster_icp {
 
-// The cells of a raster, and where a place [m] is among them.
-struct Cells {
-  double x, y, cell;
-  int64_t rows, columns;
-
-  // -1 outside; what lies beyond was not looked at.
-  int64_t at(double px, double py) const {
-    const double i = (px - x) / cell, j = (py - y) / cell;
-    if (!(i >= 0 && j >= 0 && i < static_cast<double>(rows) && j < static_cast<double>(columns))) return -1;
-    return static_cast<int64_t>(i) * columns + static_cast<int64_t>(j);
-  }
-};
+using judging::Cells;
+using judging::check_oriented;
 
 inline Cells cells_of(In<int32_t, 2> nearest, In<double, 1> origin, double cell, size_t samples) {
   if (origin.shape(0) != 2 || !(cell > 0) || nearest.shape(0) < 1 || nearest.shape(1) < 1)
     throw std::invalid_argument("origin (2,), cell > 0, nearest (rows, columns) of one at least expected");
+  int32_t least = 0, most = 0;  // without a way out: many cells are looked at together
   for (size_t k = 0; k < nearest.size(); ++k)
-    if (nearest.data()[k] < 0 || nearest.data()[k] >= static_cast<int64_t>(samples))
-      throw std::invalid_argument("nearest: numbers of samples expected");
+    least = std::min(least, nearest.data()[k]), most = std::max(most, nearest.data()[k]);
+  if (least < 0 || most >= static_cast<int64_t>(samples))
+    throw std::invalid_argument("nearest: numbers of samples expected");
   return {origin(0), origin(1), cell, static_cast<int64_t>(nearest.shape(0)),
           static_cast<int64_t>(nearest.shape(1))};
-}
-
-inline void check_oriented(In<double, 2> points, In<double, 2> normals) {
-  if (points.shape(1) != 2 || normals.shape(1) != 2 || points.shape(0) != normals.shape(0))
-    throw std::invalid_argument("points and normals: (n, 2) each expected");
 }
 
 // Solves a symmetric positive definite system by Cholesky's factors.
@@ -94,49 +79,10 @@ inline Out<double> align_on_raster(In<double, 2> points, In<double, 2> normals, 
   return give(std::move(moved), {poses.shape(0), 3});
 }
 
-// Which samples coincide with walls and which were seen through, and how far those are from their walls.
-inline std::tuple<Out<uint8_t>, Out<uint8_t>, Out<float>> judge_samples(
-    In<double, 2> points, In<double, 2> normals, In<double, 1> pose, In<double, 2> facing, In<int32_t, 2> nearest,
-    In<float, 2> distance, In<float, 2> depth, In<double, 1> origin, double cell, double closeness, double min_cosine,
-    double clearance) {
-  check_oriented(points, normals);
-  if (facing.shape(1) != 2 || pose.shape(0) != 3) throw std::invalid_argument("facing (m, 2), pose (3,) expected");
-  for (const auto& other : {distance, depth})
-    if (other.shape(0) != nearest.shape(0) || other.shape(1) != nearest.shape(1))
-      throw std::invalid_argument("nearest, distance and depth: of one shape expected");
-  if (origin.shape(0) != 2 || !(cell > 0)) throw std::invalid_argument("origin (2,), cell > 0 expected");
-  const Cells cells{origin(0), origin(1), cell, static_cast<int64_t>(nearest.shape(0)),
-                    static_cast<int64_t>(nearest.shape(1))};
-  const size_t n = points.shape(0);
-  const double c = std::cos(pose(2)), s = std::sin(pose(2));
-  const float close = static_cast<float>(closeness), deep = static_cast<float>(clearance);
-  std::vector<uint8_t> coincides(n, 0), through(n, 0);
-  std::vector<float> apart(n, std::numeric_limits<float>::infinity());
-  for (size_t k = 0; k < n; ++k) {
-    const double *q = points.data() + 2 * k, *m = normals.data() + 2 * k;
-    const int64_t at = cells.at(c * q[0] - s * q[1] + pose(0), s * q[0] + c * q[1] + pose(1));
-    if (at < 0) continue;
-    apart[k] = distance.data()[at];
-    if (apart[k] < close) {
-      const int32_t wall = nearest.data()[at];
-      if (wall < 0 || wall >= static_cast<int64_t>(facing.shape(0)))
-        throw std::invalid_argument("nearest: numbers of samples expected");
-      const double *f = facing.data() + 2 * wall;
-      coincides[k] = (c * m[0] - s * m[1]) * f[0] + (s * m[0] + c * m[1]) * f[1] > min_cosine;
-    } else {
-      through[k] = depth.data()[at] > deep;
-    }
-  }
-  return {give(std::move(coincides), {n}), give(std::move(through), {n}), give(std::move(apart), {n})};
-}
-
 }  // namespace raster_icp
 
 inline void bind_raster_icp(nb::module_& m) {
   m.def("align_on_raster", &raster_icp::align_on_raster, nb::arg("points"), nb::arg("normals"), nb::arg("poses"),
         nb::arg("scales"), nb::arg("walls"), nb::arg("facing"), nb::arg("nearest"), nb::arg("origin"),
         nb::arg("cell"), nb::arg("min_cosine"), nb::arg("damping"));
-  m.def("judge_samples", &raster_icp::judge_samples, nb::arg("points"), nb::arg("normals"), nb::arg("pose"),
-        nb::arg("facing"), nb::arg("nearest"), nb::arg("distance"), nb::arg("depth"), nb::arg("origin"),
-        nb::arg("cell"), nb::arg("closeness"), nb::arg("min_cosine"), nb::arg("clearance"));
 }

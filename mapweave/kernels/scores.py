@@ -5,55 +5,70 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from mapweave.kernels.arrays import Float32Array, FloatArray
 from mapweave.kernels.loading import COMPILED
-from mapweave.kernels.point_map import Floats
 
-Floats32 = NDArray[np.float32]
 Codes = NDArray[np.uint8]
+TURNS = 4  # added to directions, so that turned ones are above 0
 
 
 def look_up_scores_numpy(
-    samples: Floats32,
-    weight: Floats,
-    motions: Floats32,
+    points: FloatArray,
+    facing: FloatArray,
+    weight: FloatArray,
+    missing: FloatArray,
+    stride: int,
+    motions: Float32Array,
+    cell: float,
     codes: Codes,
-    worth: Floats32,
-    directions: int,
-) -> Floats:
+    worth: Float32Array,
+) -> FloatArray:
     """Twin of `look_up_scores`."""
-    x, y, facing = samples.T
+    directions, (rows, columns) = worth.shape[1], codes.shape
+    x, y = (points[::stride] / cell).astype(np.float32).T
+    looks = ((facing[::stride] + TURNS) * directions).astype(np.float32)
     c, s, x0, y0, turn = (motion[:, None] for motion in motions.T)
-    rows, columns = codes.shape
     i = np.clip(c * x - s * y + x0, 0, rows - 1).astype(np.int32)
     j = np.clip(s * x + c * y + y0, 0, columns - 1).astype(np.int32)
-    said = codes.ravel()[i * columns + j].astype(np.int64) * directions
-    direction = (facing + turn).astype(np.int32) & (directions - 1)
-    return np.asarray(worth[said + direction] @ weight, dtype=np.float64)
+    found = worth[codes[i, j], (looks + turn).astype(np.int32) & (directions - 1)]
+    few = weight[::stride] * (weight.sum() / max(weight[::stride].sum(), 1e-300))
+    counted = np.where(found < 0, missing[::stride], 1.0) * found
+    return np.asarray(counted @ few, dtype=np.float64)
 
 
 def look_up_scores(
-    samples: Floats32,
-    weight: Floats,
-    motions: Floats32,
+    points: FloatArray,
+    facing: FloatArray,
+    weight: FloatArray,
+    missing: FloatArray,
+    stride: int,
+    motions: Float32Array,
+    cell: float,
     codes: Codes,
-    worth: Floats32,
-    directions: int,
-) -> Floats:
+    worth: Float32Array,
+) -> FloatArray:
     """Return (k,) what the samples are worth at each motion, each times its weight.
 
     Parameters
     ----------
-    samples
-        (n, 3) place [cells, cells] and direction, of which there are `directions`, a power of two.
+    points, facing
+        (n, 2) samples [m], and (n,) where they face, in [0, 1) turns.
     weight
-        (n,) of the samples.
+        (n,) [m] of wall that each stands for.
+    missing
+        (n,) times what it is worth, where that is below 0.
+    stride
+        Each such sample is looked up, and stands for those between.
     motions
         (k, 5) cosine and sine of the turn, the shift [cells, cells] and the turn [directions].
         Turned directions are above 0.
+    cell
+        [m].
     codes
         (rows, columns) which row of `worth` a cell is worth: beyond the rim, what the rim says.
     worth
-        Flat rows of what a cell is worth for a sample, by the sample's turned direction.
+        (codes, directions) what a cell is worth for a sample, by the sample's turned direction; of
+        directions a power of two.
 
     Raises
     ------
@@ -61,4 +76,5 @@ def look_up_scores(
         Where lengths do not agree or a code is out of range.
     """
     compute = look_up_scores_numpy if COMPILED is None else COMPILED.look_up_scores
-    return cast("Floats", compute(samples, weight, motions, codes, worth, directions))
+    asked = points, facing, weight, missing, stride, motions, cell, codes, worth
+    return cast("FloatArray", compute(*asked))

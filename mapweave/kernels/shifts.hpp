@@ -215,23 +215,23 @@ class WideMap {
   void collect_walls(const place_views::PlaceView& view, std::vector<double>& metres) {
     const size_t size = static_cast<size_t>(rows_ * columns_);
     if (metres.size() < kFacings * size) metres.resize(kFacings * size, 0.0);
-    std::vector<size_t> found(view.samples());
+    std::vector<size_t> places(view.samples());
+    walls_.resize(view.samples());
     size_t count = 0;
     for (size_t k = 0; k < view.samples(); ++k) {
       const double* p = view.sample(k);
       const auto [row, column] = cell({p[0], p[1]});
-      const size_t place = facing(p[2]) * size + static_cast<size_t>(row * columns_ + column);
-      found[count] = place;
+      const int faces = facing(p[2]);
+      const size_t place = faces * size + static_cast<size_t>(row * columns_ + column);
+      const auto [i, j] = there(row, column);
+      places[count] = place, walls_[count] = {i, j, faces, 0};
       count += metres[place] == 0 && p[3] > 0;
       metres[place] += p[3];
     }
-    found.resize(count);
-    for (const size_t place : found) {
-      const int64_t in_plane = static_cast<int64_t>(place % size);
-      const auto [row, column] = there(in_plane / columns_, in_plane % columns_);
-      walls_.push_back({row, column, static_cast<int>(place / size),
-                        static_cast<int32_t>(std::nearbyint(metres[place] / kCentimetre))});
-      metres[place] = 0;
+    walls_.resize(count);
+    for (size_t k = 0; k < count; ++k) {
+      walls_[k].metres = static_cast<int32_t>(std::nearbyint(metres[places[k]] / kCentimetre));
+      metres[places[k]] = 0;
     }
     std::sort(walls_.begin(), walls_.end(), [](const Wall& a, const Wall& b) { return a.block() < b.block(); });
   }

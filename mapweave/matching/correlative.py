@@ -116,11 +116,17 @@ def search(
 
 
 def _separate_maxima(scores: Float32Array, count: int) -> list[tuple[int, int, int]]:
-    """Indices of the highest scores, each at least 4 turns or 3 shifts from the better ones."""
-    left = scores.copy()
+    """Indices of the highest scores, each at least 4 turns or 3 shifts from the better ones.
+
+    What is in `scores` is lost.
+    """
+    highest = scores.max(axis=(1, 2))  # of each turn: few of them change from one to the next
     found: list[tuple[int, int, int]] = []
     for _ in range(count):
-        k, i, j = (int(v) for v in np.unravel_index(int(left.argmax()), left.shape))
+        k = int(highest.argmax())
+        i, j = (int(v) for v in np.unravel_index(int(scores[k].argmax()), scores.shape[1:]))
         found.append((k, i, j))
-        left[max(0, k - 3) : k + 4, max(0, i - 2) : i + 3, max(0, j - 2) : j + 3] = -1
+        near = scores[max(0, k - 3) : k + 4]
+        near[:, max(0, i - 2) : i + 3, max(0, j - 2) : j + 3] = -1
+        highest[max(0, k - 3) : k + 4] = near.max(axis=(1, 2))
     return found

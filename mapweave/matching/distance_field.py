@@ -11,12 +11,13 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
-from mapweave.geometry.segments import lengths
+from mapweave.kernels.lines.sampling import sample_lines
 from mapweave.kernels.matching import rasters
 from mapweave.kernels.matching.density import times_drawn
+from mapweave.kernels.matching.judging import Raster, Samples
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
-from mapweave.scan.points import OrientedPoints, points_on_lines
+from mapweave.scan.points import OrientedPoints
 
 
 class DistanceFieldParameters(StageParameters):
@@ -87,14 +88,11 @@ class DistanceField:
     def of(cls, line_map: LineMap, parameters: DistanceFieldParameters) -> "DistanceField":
         """Rasterise `line_map`, which has at least one segment."""
         p = parameters
-        oriented, segment = points_on_lines(line_map, p.spacing)
-        length = lengths(line_map.segments)
-        counts = np.bincount(segment, minlength=len(length))
-        trust = np.minimum(1.0, line_map.support / p.full_support)
-        step = length / np.maximum(counts, 1)
-        weight = (trust * step)[segment]
+        points, normals, segment, step = sample_lines(line_map.segments, p.spacing)
+        oriented = OrientedPoints(points, normals, line_map.polyline[segment])
+        weight = np.minimum(1.0, line_map.support / p.full_support)[segment] * step
         if p.same_wall > 0:
-            drawn = oriented.points, oriented.normals, step[segment]
+            drawn = points, normals, step
             weight = weight / times_drawn(*drawn, p.same_wall, p.min_cosine)
         low = oriented.points.min(axis=0) - p.border
         high = oriented.points.max(axis=0) + p.border
@@ -104,6 +102,20 @@ class DistanceField:
         # The raster's rim is not free: what lies beyond was not looked at.
         depth = rasters.depths(line_map.free_space, low, cell, rows, columns)
         return cls(oriented, weight, segment, low, cell, nearest, distance, depth)
+
+    @cached_property
+    def samples(self) -> Samples:
+        """Its walls, as they are looked up in the rasters of others."""
+        return Samples(self.oriented.points, self.oriented.normals, self.own_depth)
+
+    @cached_property
+    def cells(self) -> Raster:
+        """What the walls of others are looked up in."""
+        return Raster(
+            self.oriented.normals,
+            *(self.nearest, self.distance, self.depth),
+            *(self.origin, self.cell),
+        )
 
     @cached_property
     def own_depth(self) -> Float32Array:

@@ -65,5 +65,4 @@ def _scales(p: FieldIcpParameters) -> FloatArray:
 
 def _about(transforms: FloatArray, middle: FloatArray) -> FloatArray:
     """(k, 3) the same motions of coordinates less `middle` (2,)."""
-    moved = np.column_stack([np.tile(middle, (len(transforms), 1)), np.zeros(len(transforms))])
-    return se2.compose(transforms, moved)
+    return se2.compose(transforms, np.array([*middle.tolist(), 0.0]))

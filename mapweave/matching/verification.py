@@ -14,9 +14,9 @@ from pydantic import Field
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray
-from mapweave.kernels.matching.judging import judge_samples
+from mapweave.kernels.matching.judging import Limits, Weighed, judge_samples, weigh_samples
 from mapweave.kernels.matching.rasters import Codes, cell_codes
-from mapweave.kernels.scores import look_up_scores
+from mapweave.kernels.scores import TURNS, look_up_scores
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.free_standing import free_standing
@@ -100,17 +100,6 @@ class Verdict:
         return self.common - self.contradiction_weight * self.contradicted
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _OneWay:
-    """The samples of one map in the other: (n,) masks and weighted sums."""
-
-    coincides: BoolArray
-    contradicts: BoolArray
-    distance: FloatArray
-    common: float
-    contradicted: float
-
-
 def coarse_scores(
     reference: DistanceField,
     other: DistanceField,
@@ -137,28 +126,14 @@ def _coarse_one_way(
 ) -> FloatArray:
     """One look-up for each sample: in single precision, as the cells are coarser than that."""
     stride = 1 + (len(other.weight) - 1) // max_samples
-    weight = other.weight[::stride]
-    weight = weight * (other.weight.sum() / weight.sum())
-    samples = np.empty((len(weight), 3), dtype=np.float32)
-    samples[:, :2] = other.oriented.points[::stride] / reference.cell
-    samples[:, 2] = _directions(other.facing[::stride])
+    walls = other.oriented.points, other.facing, other.weight, worth_of_missing(other, p)
     angle = transforms[:, 2].astype(np.float32)
     motions = np.empty((len(transforms), 5), dtype=np.float32)
     motions[:, 0], motions[:, 1] = np.cos(angle), np.sin(angle)
     motions[:, 2:4] = (transforms[:, :2] - reference.origin) / reference.cell
     motions[:, 4] = angle * np.float32(DIRECTIONS / (2 * np.pi))
-    codes, missing = _codes(reference, p), worth_of_missing(other, p)[::stride]
-    scores = np.zeros(len(transforms))
-    for each in sorted(set(missing.tolist())):  # two at the most
-        some = missing == each
-        worth = _worth(p.min_cosine, p.contradiction_weight, each)
-        scores += look_up_scores(samples[some], weight[some], motions, codes, worth, DIRECTIONS)
-    return scores
-
-
-def _directions(facing: FloatArray) -> FloatArray:
-    """(n,) directions in [0, DIRECTIONS) of turns, shifted so that sums stay positive."""
-    return np.asarray((facing + 4) * DIRECTIONS)
+    worth = _worth(p.min_cosine, p.contradiction_weight)
+    return look_up_scores(*walls, stride, motions, reference.cell, _codes(reference, p), worth)
 
 
 def _codes(raster: DistanceField, p: VerificationParameters) -> Codes:
@@ -178,22 +153,22 @@ def said_by_cells(raster: DistanceField, closeness: float, clearance: float) -> 
 
     SEEN_THROUGH where space is free by more than `clearance` [m], else NOTHING.
     """
-    facing = (_directions(raster.facing).astype(np.int32) & (DIRECTIONS - 1)).astype(np.uint8)
-    said = closeness, clearance, NOTHING, SEEN_THROUGH
-    return cell_codes(raster.nearest, raster.distance, raster.depth, facing, *said)
+    facing = ((raster.facing + TURNS) * DIRECTIONS).astype(np.int32) & (DIRECTIONS - 1)
+    cells = raster.nearest, raster.distance, raster.depth, facing.astype(np.uint8)
+    return cell_codes(*cells, closeness, clearance, NOTHING, SEEN_THROUGH)
 
 
 @lru_cache(16)
-def _worth(min_cosine: float, contradiction_weight: float, missing: float) -> Float32Array:
-    """What a metre of wall counts, by the cell's code and the wall's direction, flat.
+def _worth(min_cosine: float, contradiction_weight: float) -> Float32Array:
+    """(codes, directions) what a metre of wall counts, by the cell's code and the wall's direction.
 
-    Where it is `missing`, so many metres of what it contradicts.
+    Below 0 where it is seen through, and is missing.
     """
     turn = 2 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
     worth: Float32Array = np.zeros((SEEN_THROUGH + 1, DIRECTIONS), dtype=np.float32)
     worth[:DIRECTIONS] = np.cos(turn[:, None] - turn) > min_cosine
-    worth[SEEN_THROUGH] = -contradiction_weight * missing
-    return worth.ravel()
+    worth[SEEN_THROUGH] = -contradiction_weight
+    return worth
 
 
 def verify(
@@ -209,8 +184,8 @@ def verify(
         common,
         contradicted,
         common / max(common + contradicted, 1e-9),
-        _median(forward.distance),
-        _held(other, forward.coincides),
+        forward.residual,
+        forward.held,
         parameters.contradiction_weight,
     )
 
@@ -253,7 +228,8 @@ def coinciding(
     parameters: VerificationParameters,
 ) -> BoolArray:
     """Tell which samples (n,) of the walls of `other` are on walls of `reference`."""
-    return _judged(reference, other, transform, parameters)[0]
+    limits = _limits(parameters)
+    return judge_samples(other.samples, transform, reference.cells, limits)[0]
 
 
 def contradicting(
@@ -263,7 +239,8 @@ def contradicting(
     parameters: VerificationParameters,
 ) -> BoolArray:
     """Tell which samples (n,) of the walls of `other` lie where `reference` saw free space."""
-    return _judged(reference, other, transform, parameters)[1]
+    limits = _limits(parameters)
+    return judge_samples(other.samples, transform, reference.cells, limits)[1]
 
 
 def _both_ways(
@@ -271,14 +248,14 @@ def _both_ways(
     other: DistanceField,
     transform: FloatArray,
     parameters: VerificationParameters,
-) -> tuple[_OneWay, _OneWay]:
+) -> tuple[Weighed, Weighed]:
     """Look the samples of each map up in the other."""
     forward = _one_way(reference, other, transform, parameters)
     backward = _one_way(other, reference, se2.inverse(transform), parameters)
     return forward, backward
 
 
-def _tallied(forward: _OneWay, backward: _OneWay) -> Tally:
+def _tallied(forward: Weighed, backward: Weighed) -> Tally:
     contradicted = forward.contradicted + backward.contradicted
     common = min(forward.common, backward.common)
     return Tally(common, contradicted)
@@ -286,30 +263,14 @@ def _tallied(forward: _OneWay, backward: _OneWay) -> Tally:
 
 def _one_way(
     reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
-) -> _OneWay:
+) -> Weighed:
     """Look the samples of `other` up in `reference`."""
-    coincides, contradicts, distance = _judged(reference, other, transform, p)
-    return _OneWay(
-        coincides,
-        contradicts,
-        distance[coincides].astype(np.float64),
-        float(other.weight[coincides].sum()),
-        float((other.weight * worth_of_missing(other, p))[contradicts].sum()),
-    )
+    weights = other.weight, worth_of_missing(other, p)
+    return weigh_samples(other.samples, *weights, transform, reference.cells, _limits(p))
 
 
-def _judged(
-    reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
-) -> tuple[BoolArray, BoolArray, Float32Array]:
-    """(n,) which samples of `other` coincide, which contradict, how far they are from walls [m]."""
-    coincides, through, distance = judge_samples(
-        *(other.oriented.points, other.oriented.normals, transform, reference.oriented.normals),
-        *(reference.nearest, reference.distance, reference.depth),
-        reference.origin,
-        *(reference.cell, p.closeness, p.min_cosine, p.clearance),
-    )
-    # What its own map saw through later was no wall for long: it refutes nothing.
-    return coincides, through & (other.own_depth < p.clearance), distance
+def _limits(p: VerificationParameters) -> Limits:
+    return Limits(p.closeness, p.min_cosine, p.clearance)
 
 
 def worth_of_missing(other: DistanceField, p: VerificationParameters) -> FloatArray:
@@ -318,16 +279,3 @@ def worth_of_missing(other: DistanceField, p: VerificationParameters) -> FloatAr
         return np.ones(len(other.weight))
     moved = free_standing(other, p.moved_gap, p.moved_side)
     return np.where(moved, p.moved_weight, 1.0)
-
-
-def _median(distance: FloatArray) -> float:
-    """[m]; infinite where there is none. What `np.median` returns, in a tenth of the time."""
-    n, ordered = len(distance), np.sort(distance)
-    return float((ordered[(n - 1) // 2] + ordered[n // 2]) / 2) if n else np.inf
-
-
-def _held(other: DistanceField, coincides: BoolArray) -> float:
-    """[m] of coinciding wall that hold the weakest direction of translation."""
-    normals = other.oriented.normals[coincides]
-    scatter = (normals * other.weight[coincides, None]).T @ normals
-    return float(np.linalg.eigvalsh(scatter)[0])

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.kernels.lines.sampling import sample_lines
 from mapweave.kernels.segmentation import orient
 from mapweave.maps import LineMap
 from mapweave.scan.scan import Scan
@@ -117,12 +118,5 @@ def points_on_lines(lines: LineMap, spacing: float) -> tuple[OrientedPoints, Int
     tuple of OrientedPoints and IntArray
         The points, and (n,) which segment each is on.
     """
-    segments = lines.segments
-    directions = segments[:, 2:] - segments[:, :2]
-    lengths = np.hypot(directions[:, 0], directions[:, 1])
-    counts = np.maximum(1, np.round(lengths / spacing)).astype(np.int64)
-    owner = np.repeat(np.arange(len(segments)), counts)
-    rank = np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
-    fraction = (rank + 0.5) / counts[owner]
-    points = segments[owner, :2] + fraction[:, None] * directions[owner]
-    return OrientedPoints(points, left_normals(directions)[owner], lines.polyline[owner]), owner
+    points, normals, owner, _ = sample_lines(lines.segments, spacing)
+    return OrientedPoints(points, normals, lines.polyline[owner]), owner

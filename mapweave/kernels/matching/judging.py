@@ -1,6 +1,6 @@
 """What samples of one map's walls find in the raster of another: walls, or space seen through."""
 
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -8,79 +8,170 @@ from mapweave.kernels.arrays import BoolArray, Float32Array, FloatArray, Int32Ar
 from mapweave.kernels.loading import COMPILED
 
 
-def judge_samples_numpy(
-    points: FloatArray,
-    normals: FloatArray,
-    pose: FloatArray,
-    facing: FloatArray,
-    nearest: Int32Array,
-    distance: Float32Array,
-    depth: Float32Array,
-    origin: FloatArray,
-    cell: float,
-    closeness: float,
-    min_cosine: float,
-    clearance: float,
-) -> tuple[BoolArray, BoolArray, Float32Array]:
-    """Twin of `judge_samples`."""
-    if not points.shape == normals.shape == (len(points), 2):
-        raise ValueError("points and normals: (n, 2) each expected")
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    turn = np.array([[c, s], [-s, c]])
-    index = np.floor((points @ turn + pose[:2] - origin) / cell)
-    inside = ((index >= 0) & (index < nearest.shape)).all(axis=1)
-    i, j = np.where(inside[:, None], index, 0).astype(np.int64).T
-    apart = np.where(inside, distance[i, j], np.float32(np.inf))
-    near = apart < closeness
-    cosine = ((normals @ turn) * facing[nearest[i, j]]).sum(axis=1)
-    return near & (cosine > min_cosine), inside & ~near & (depth[i, j] > clearance), apart
+class Samples(NamedTuple):
+    """Of a map's walls.
 
-
-def judge_samples(
-    points: FloatArray,
-    normals: FloatArray,
-    pose: FloatArray,
-    facing: FloatArray,
-    nearest: Int32Array,
-    distance: Float32Array,
-    depth: Float32Array,
-    origin: FloatArray,
-    cell: float,
-    closeness: float,
-    min_cosine: float,
-    clearance: float,
-) -> tuple[BoolArray, BoolArray, Float32Array]:
-    """Return (n,) which samples coincide with walls, which were seen through, how far walls are.
-
-    The distance is infinite outside of the raster.
-
-    Parameters
+    Attributes
     ----------
     points, normals
         (n, 2) samples [m], and where they face.
-    pose
-        (3,) takes them into the raster's frame [m, m, rad].
+    own_depth
+        (n,) how deep each lies in the free space of its own map [m].
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    own_depth: Float32Array
+
+
+class Raster(NamedTuple):
+    """The map that they are looked up in.
+
+    Attributes
+    ----------
     facing
-        (m, 2) where the samples of the raster's walls face.
+        (m, 2) where the samples of its walls face.
     nearest, distance, depth
         (rows, columns) the sample nearest to each cell, how far it is [m], and how deep in free
         space the cell lies [m].
     origin, cell
-        (2,) the raster's corner [m]; the cells' size [m].
+        (2,) its corner [m]; the cells' size [m].
+    """
+
+    facing: FloatArray
+    nearest: Int32Array
+    distance: Float32Array
+    depth: Float32Array
+    origin: FloatArray
+    cell: float
+
+
+class Limits(NamedTuple):
+    """When samples coincide and when they contradict.
+
+    Attributes
+    ----------
     closeness, min_cosine
         [m] within which, and of the normals above which, a sample coincides.
     clearance
-        [m] of free space beyond which a sample that is not so near was seen through.
+        [m] of free space beyond which a sample that is not so near was seen through, unless it lies
+        as deep in that of its own map.
+    """
+
+    closeness: float
+    min_cosine: float
+    clearance: float
+
+
+class Weighed(NamedTuple):
+    """What samples say, summed.
+
+    Attributes
+    ----------
+    common, contradicted
+        [m] of wall that coincides, and that was seen through.
+    residual
+        [m] median distance of what coincides; infinite where nothing does.
+    held
+        [m] of what coincides that hold the weakest direction of translation.
+    """
+
+    common: float
+    contradicted: float
+    residual: float
+    held: float
+
+
+def judge_samples_numpy(
+    samples: Samples, pose: FloatArray, raster: Raster, limits: Limits
+) -> tuple[BoolArray, BoolArray]:
+    """Twin of `judge_samples`."""
+    return _judged(samples, pose, raster, limits)[:2]
+
+
+def judge_samples(
+    samples: Samples, pose: FloatArray, raster: Raster, limits: Limits
+) -> tuple[BoolArray, BoolArray]:
+    """Return (n,) which samples coincide with walls, and which were seen through.
+
+    Parameters
+    ----------
+    pose
+        (3,) takes the samples into the raster's frame [m, m, rad].
 
     Raises
     ------
     ValueError
         Where lengths do not agree.
     """
-    compute = judge_samples_numpy if COMPILED is None else COMPILED.judge_samples
-    coincides, through, apart = compute(
-        *(points, normals, pose, facing, nearest, distance, depth),
-        *(origin, cell, closeness, min_cosine, clearance),
+    if COMPILED is None:
+        return judge_samples_numpy(samples, pose, raster, limits)
+    coincides, through = COMPILED.judge_samples(*samples, pose, *raster, *limits)
+    return coincides.view(np.bool_), through.view(np.bool_)
+
+
+def weigh_samples_numpy(
+    samples: Samples,
+    weight: FloatArray,
+    missing: FloatArray,
+    pose: FloatArray,
+    raster: Raster,
+    limits: Limits,
+) -> Weighed:
+    """Twin of `weigh_samples`."""
+    coincides, through, apart = _judged(samples, pose, raster, limits)
+    common, normals = weight[coincides], samples.normals[coincides]
+    scatter = (normals * common[:, None]).T @ normals
+    return Weighed(
+        float(common.sum()),
+        float((weight * missing)[through].sum()),
+        float(np.median(apart[coincides].astype(np.float64))) if len(common) else np.inf,
+        float(np.linalg.eigvalsh(scatter)[0]),
     )
-    found = coincides.view(np.bool_), through.view(np.bool_), apart
-    return cast("tuple[BoolArray, BoolArray, Float32Array]", found)
+
+
+def weigh_samples(
+    samples: Samples,
+    weight: FloatArray,
+    missing: FloatArray,
+    pose: FloatArray,
+    raster: Raster,
+    limits: Limits,
+) -> Weighed:
+    """Return what `judge_samples` tells, summed.
+
+    Parameters
+    ----------
+    weight
+        (n,) [m] of wall that each sample stands for.
+    missing
+        (n,) what a metre of it counts where it was seen through.
+    """
+    if COMPILED is None:
+        return weigh_samples_numpy(samples, weight, missing, pose, raster, limits)
+    points, normals, own_depth = samples
+    weighed = COMPILED.weigh_samples(
+        points, normals, weight, missing, own_depth, pose, *raster, *limits
+    )
+    return Weighed(*cast("tuple[float, float, float, float]", weighed))
+
+
+def _judged(
+    samples: Samples, pose: FloatArray, raster: Raster, limits: Limits
+) -> tuple[BoolArray, BoolArray, Float32Array]:
+    """(n,) which coincide, which were seen through, how far walls are: infinitely, outside."""
+    points, normals, own_depth = samples
+    if not points.shape == normals.shape == (len(own_depth), 2):
+        raise ValueError("points and normals (n, 2), own_depth (n,) expected")
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    turn = np.array([[c, s], [-s, c]])
+    index = np.floor((points @ turn + pose[:2] - raster.origin) / raster.cell)
+    inside = ((index >= 0) & (index < raster.nearest.shape)).all(axis=1)
+    i, j = np.where(inside[:, None], index, 0).astype(np.int64).T
+    apart = np.where(inside, raster.distance[i, j], np.float32(np.inf))
+    near = apart < limits.closeness
+    cosine = ((normals @ turn) * raster.facing[raster.nearest[i, j]]).sum(axis=1)
+    through = inside & ~near & (raster.depth[i, j] > limits.clearance)
+    # What its own map saw through later was no wall for long: it refutes nothing.
+    through &= own_depth < limits.clearance
+    return near & (cosine > limits.min_cosine), through, apart

@@ -135,16 +135,22 @@ def test_points_and_paths_are_as_deep_inside(seed: int, count: int, corners: int
 
 
 @settings(max_examples=40, deadline=None)
-@given(seeds, counts, counts)
-def test_samples_are_worth_the_same_at_many_motions(seed: int, count: int, motions: int) -> None:
+@given(seeds, counts, counts, st.integers(1, 4))
+def test_samples_are_worth_the_same_at_many_motions(
+    seed: int, count: int, motions: int, stride: int
+) -> None:
     rng = np.random.default_rng(seed)
-    samples = rng.uniform(-9, 9, (count, 3)) + np.array([0, 0, 200])
+    points, (facing, weight, missing) = (
+        rng.uniform(-9, 9, (count, 2)),
+        rng.uniform(0, 1, (3, count)),
+    )
     angle, shift = rng.uniform(-3, 3, motions), rng.uniform(0, 20, (motions, 2))
     moved = np.column_stack([np.cos(angle), np.sin(angle), shift, angle * 64 / (2 * np.pi)])
     codes = rng.integers(0, 3, (20, 15), dtype=np.uint8)
-    asked = (samples.astype(np.float32), rng.uniform(0, 1, count), moved.astype(np.float32), codes)
-    worth = rng.normal(0, 1, 3 * 64).astype(np.float32)
-    same(scores.look_up_scores(*asked, worth, 64), scores.look_up_scores_numpy(*asked, worth, 64))
+    worth = rng.normal(0, 1, (3, 64)).astype(np.float32)
+    walls = points, facing, weight, missing, stride
+    asked = *walls, moved.astype(np.float32), 0.5, codes, worth
+    same(scores.look_up_scores(*asked), scores.look_up_scores_numpy(*asked))
 
 
 ONE, PLACES = np.ones(1, dtype=np.int64), np.zeros((1, 2))

@@ -18,6 +18,7 @@ from mapweave.kernels.lines.main_directions import (
 )
 from mapweave.kernels.lines.merging import NumpyEvolvingMap
 from mapweave.kernels.lines.polylines import numpy_group_polylines
+from mapweave.kernels.lines.sampling import sample_lines, sample_lines_numpy
 from mapweave.kernels.lines.slivers import numpy_sliver_owners
 from mapweave.kernels.loading import COMPILED
 from mapweave.lines.merging import MergingParameters
@@ -220,3 +221,17 @@ def test_points_are_paired_with_those_within_reach(seed: int, count: int, reach:
     apart = np.hypot(*(first[:, None] - second).T).T.reshape(len(first), len(second))
     found = near_points(first, second, reach)
     np.testing.assert_array_equal(np.stack(found), np.stack(np.nonzero(apart <= reach)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, sizes, st.sampled_from([0.07, 0.5, 20.0]))
+def test_lines_have_the_same_samples(seed: int, count: int, spacing: float) -> None:
+    walls = walls_seen(np.random.default_rng(seed), count)
+    found = sample_lines(walls, spacing), sample_lines_numpy(walls, spacing)
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+def test_lines_that_are_not_finite_are_refused() -> None:
+    with pytest.raises(ValueError, match="finite"):
+        sample_lines(np.full((1, 4), np.nan), 0.1)

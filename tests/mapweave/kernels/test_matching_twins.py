@@ -93,9 +93,13 @@ def test_samples_find_the_same_in_a_raster(seed: int, count: int, walls: int, st
     depth = rng.uniform(0, 1, nearest.shape).astype(np.float32)
     points, normals = 1.5 * some_places(rng, count), units(rng, count)
     pose = rng.normal(0, 0.3, 3)
-    asked = points, normals, pose, facing, nearest, distance, depth
-    limits = ORIGIN, CELL, 0.3, 0.5, 0.4
-    same(judging.judge_samples(*asked, *limits), judging.judge_samples_numpy(*asked, *limits))
+    samples = judging.Samples(points, normals, rng.uniform(0, 1, count).astype(np.float32))
+    raster = judging.Raster(facing, nearest, distance, depth, ORIGIN, CELL)
+    asked = pose, raster, judging.Limits(0.3, 0.5, 0.4)
+    same(judging.judge_samples(samples, *asked), judging.judge_samples_numpy(samples, *asked))
+    weight, missing = rng.uniform(0, 1, (2, count))
+    weighed = judging.weigh_samples(samples, weight, missing, *asked)
+    same(weighed, judging.weigh_samples_numpy(samples, weight, missing, *asked))
     poses, scales = rng.normal(0, 0.3, (starts, 3)), np.geomspace(0.5, 0.1, 4)
     moved = points, normals, poses, scales, there, facing, nearest, ORIGIN, CELL, 0.7, 0.3
     same(raster_icp.align_on_raster(*moved), raster_icp.align_on_raster_numpy(*moved))

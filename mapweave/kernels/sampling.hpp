@@ -1,0 +1,49 @@
+// Samples along lines. The twin and the words are in lines/sampling.py.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <vector>
+
+#include "arrays.hpp"
+
+namespace sampling {
+
+inline std::tuple<Out<double>, Out<double>, Out<int64_t>, Out<double>> sample_lines(In<double, 2> segments,
+                                                                                    double spacing) {
+  if (segments.shape(1) != 4 || !(spacing > 0)) throw std::invalid_argument("segments (n, 4), spacing > 0 expected");
+  constexpr double kMost = 1e8;
+  const size_t lines = segments.shape(0);
+  std::vector<double> length(lines), count(lines);
+  double all = 0;
+  for (size_t k = 0; k < lines; ++k) {
+    const double* s = segments.data() + 4 * k;
+    length[k] = std::hypot(s[2] - s[0], s[3] - s[1]);
+    if (!std::isfinite(length[k])) throw std::invalid_argument("segments: finite numbers expected");
+    count[k] = std::max(1.0, std::nearbyint(length[k] / spacing));
+    all += count[k];
+  }
+  if (!(all <= kMost)) throw std::invalid_argument("spacing: fewer samples expected");
+  const size_t n = static_cast<size_t>(all);
+  std::vector<double> points(2 * n), normals(2 * n), metres(n);
+  std::vector<int64_t> owner(n);
+  for (size_t k = 0, at = 0; k < lines; ++k) {
+    const double* s = segments.data() + 4 * k;
+    const double dx = s[2] - s[0], dy = s[3] - s[1], unit = std::max(length[k], 1e-12);
+    for (double rank = 0; rank < count[k]; ++rank, ++at) {
+      const double fraction = (rank + 0.5) / count[k];
+      points[2 * at] = s[0] + fraction * dx, points[2 * at + 1] = s[1] + fraction * dy;
+      normals[2 * at] = -dy / unit, normals[2 * at + 1] = dx / unit;
+      owner[at] = static_cast<int64_t>(k);
+      metres[at] = length[k] / count[k];
+    }
+  }
+  return {give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}), give(std::move(owner), {n}),
+          give(std::move(metres), {n})};
+}
+
+}  // namespace sampling
+
+inline void bind_sampling(nb::module_& m) {
+  m.def("sample_lines", &sampling::sample_lines, nb::arg("segments"), nb::arg("spacing"));
+}
