@@ -8,6 +8,7 @@ from itertools import chain
 
 import zenoh
 
+from mapweave.errors import MapweaveError
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import RobotMap
@@ -134,7 +135,7 @@ class AgentRun:
         self._inbox = Inbox()
         self._live: LiveScans | None = None
         self._scans_seen = 0
-        self._changed = self._unkept = self._finished = False
+        self._changed = self._unkept = self._finished = self._hurried = False
 
     @property
     def finished(self) -> bool:
@@ -189,7 +190,11 @@ class AgentRun:
             self._join_when_possible()
             if self._session is None:
                 _log.info("maps by itself until a router answers")
-            yield
+            try:
+                yield
+            except MapweaveError:  # as of its source: what came before that is told
+                self._leave()
+                raise
             if self._reception.refused:
                 _log.warning("%d messages were not valid and ignored", self._reception.refused)
 
@@ -213,15 +218,22 @@ class AgentRun:
             self._finish()
         while not stopping():
             self._attend(POLL)
-        self._leave()
+        self._leave(stopping)
 
-    def _leave(self) -> None:
+    def _leave(self, stopping: Stopping = lambda: True) -> None:
         """Publish what is not yet, and wait a moment for the coordinators that are here."""
         if self._changed and not self._finished:
             self._publish_map()
         deadline = time.monotonic() + self._parameters.leave_within
         while not self._needs.delivered(self._map.state) and time.monotonic() < deadline:
             self._attend(POLL)
+            stopping()  # it may have more to say: to hurry
+            if self._hurried:
+                break
+
+    def hurry(self) -> None:
+        """Leave without waiting for the coordinators."""
+        self._hurried = True
 
     def _map_all(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         started = time.monotonic()

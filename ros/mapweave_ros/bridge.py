@@ -10,7 +10,7 @@ from mapweave.errors import ArgumentError
 from mapweave.maps import JointMap
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.security.settings import LinkSettings
-from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.link.stopping import StopSignals
 from mapweave_protocol.link.subscriber import joint_maps, poses
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 from mapweave_protocol.wire.messages import PoseMessage
@@ -42,7 +42,7 @@ def _run(options: argparse.Namespace) -> int:
     begin_log(options, "bridge")
     team, endpoints, link = connection_of(options)
     with _output(options.to, team, endpoints) as output:
-        _Following(team, endpoints, link, output).run(stop_on_signal())
+        _Following(team, endpoints, link, output).run(StopSignals())
     return 0
 
 
