@@ -21,7 +21,7 @@ from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.listening import listening
 from mapweave_agent.live.attending import attending
-from mapweave_agent.live.joining import Connected
+from mapweave_agent.live.joining import Connected, LinkNews
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -133,6 +133,7 @@ class AgentRun:
             state,
         )
         self._inbox = Inbox()
+        self._link = LinkNews(_log.warning, _log.info)
         self._live: LiveScans | None = None
         self._scans_seen = 0
         self._changed = self._unkept = self._finished = self._hurried = False
@@ -215,7 +216,7 @@ class AgentRun:
 
     def _compare_until(self, stopping: Stopping) -> None:
         if not stopping():
-            self._finish()
+            self._finish(stopping)
         while not stopping():
             self._attend(POLL)
         self._leave(stopping)
@@ -262,17 +263,18 @@ class AgentRun:
         if placement.lost:
             _log.warning("scan %d fits nowhere: a new component begins", scan.index)
 
-    def _finish(self) -> None:
+    def _finish(self, stopping: Stopping) -> None:
         """Publish the last map, and say that it is the last."""
         self._finished = True
         self._mapper.finish()
         self._publish_map()
         self._publish_status()
         _log.info(
-            "finished: %d of %d scans placed, submaps: %d",
+            "finished: %d of %d scans placed, submaps: %d%s",
             self._map.scans_placed,
             self._scans_seen,
             len(self._map.told.submaps),
+            "" if stopping() else "; compares with its team until Ctrl-C",
         )
 
     def _attend(self, wait: float) -> None:
@@ -286,6 +288,7 @@ class AgentRun:
             timeout = 0.0
         self._join_when_possible()
         now = time.monotonic()
+        self._link.look(self._session, now)
         if self._reception.met():
             self._statuses.met(now)
             self._needs.met(now)

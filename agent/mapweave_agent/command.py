@@ -229,6 +229,7 @@ def _read_options(
         told_once(_log.warning),
         endpoints,
         odometry.topic,
+        on_news=told_once(_log.info),
     )
 
 
