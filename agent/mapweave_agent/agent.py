@@ -8,6 +8,7 @@ from itertools import chain
 
 import zenoh
 
+from mapweave.errors import MapweaveError
 from mapweave.geometry.arrays import FloatArray
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import RobotMap
@@ -20,7 +21,7 @@ from mapweave_agent.comparison_worker import ComparisonWorker
 from mapweave_agent.dispatch import Dispatcher
 from mapweave_agent.listening import listening
 from mapweave_agent.live.attending import attending
-from mapweave_agent.live.joining import Connected
+from mapweave_agent.live.joining import Connected, LinkNews
 from mapweave_agent.live.scans import LiveScans
 from mapweave_agent.live.whereabouts import Whereabouts
 from mapweave_agent.needs import Needs
@@ -132,9 +133,10 @@ class AgentRun:
             state,
         )
         self._inbox = Inbox()
+        self._link = LinkNews(_log.warning, _log.info)
         self._live: LiveScans | None = None
         self._scans_seen = 0
-        self._changed = self._unkept = self._finished = False
+        self._changed = self._unkept = self._finished = self._hurried = False
 
     @property
     def finished(self) -> bool:
@@ -189,7 +191,11 @@ class AgentRun:
             self._join_when_possible()
             if self._session is None:
                 _log.info("maps by itself until a router answers")
-            yield
+            try:
+                yield
+            except MapweaveError:  # as of its source: what came before that is told
+                self._leave()
+                raise
             if self._reception.refused:
                 _log.warning("%d messages were not valid and ignored", self._reception.refused)
 
@@ -210,18 +216,25 @@ class AgentRun:
 
     def _compare_until(self, stopping: Stopping) -> None:
         if not stopping():
-            self._finish()
+            self._finish(stopping)
         while not stopping():
             self._attend(POLL)
-        self._leave()
+        self._leave(stopping)
 
-    def _leave(self) -> None:
+    def _leave(self, stopping: Stopping = lambda: True) -> None:
         """Publish what is not yet, and wait a moment for the coordinators that are here."""
         if self._changed and not self._finished:
             self._publish_map()
         deadline = time.monotonic() + self._parameters.leave_within
         while not self._needs.delivered(self._map.state) and time.monotonic() < deadline:
             self._attend(POLL)
+            stopping()  # it may have more to say: to hurry
+            if self._hurried:
+                break
+
+    def hurry(self) -> None:
+        """Leave without waiting for the coordinators."""
+        self._hurried = True
 
     def _map_all(self, scans: Iterator[Scan], clock: ReplayClock, stopping: Stopping) -> None:
         started = time.monotonic()
@@ -250,17 +263,18 @@ class AgentRun:
         if placement.lost:
             _log.warning("scan %d fits nowhere: a new component begins", scan.index)
 
-    def _finish(self) -> None:
+    def _finish(self, stopping: Stopping) -> None:
         """Publish the last map, and say that it is the last."""
         self._finished = True
         self._mapper.finish()
         self._publish_map()
         self._publish_status()
         _log.info(
-            "finished: %d of %d scans placed, submaps: %d",
+            "finished: %d of %d scans placed, submaps: %d%s",
             self._map.scans_placed,
             self._scans_seen,
             len(self._map.told.submaps),
+            "" if stopping() else "; compares with its team until Ctrl-C",
         )
 
     def _attend(self, wait: float) -> None:
@@ -274,6 +288,7 @@ class AgentRun:
             timeout = 0.0
         self._join_when_possible()
         now = time.monotonic()
+        self._link.look(self._session, now)
         if self._reception.met():
             self._statuses.met(now)
             self._needs.met(now)

@@ -46,7 +46,7 @@ from mapweave_protocol.link.security.membership import check_member
 from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.session import open_session
-from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.link.stopping import StopSignals
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 from mapweave_protocol.wire.keys import new_boot
 
@@ -168,12 +168,27 @@ def _run(options: argparse.Namespace) -> int:
         run = AgentRun(
             connected, team, mapper, comparer, total, parameters, earlier.folder, past, first, tell
         )
-        try:
-            with spared():
-                _run_on(source, run, options)
-        finally:  # also where its source has failed
-            _write(run.robot_map, options.output)
+        stopping = StopSignals()
+        with stopping.nothing_lost(lambda: _hurry(run, earlier.folder.path, options)):
+            try:
+                with spared():
+                    _run_on(source, run, stopping, options)
+            finally:  # also where its source has failed
+                _write(run.robot_map, options.output)
     return 0
+
+
+def _hurry(run: AgentRun, state: Path, options: argparse.Namespace) -> None:
+    """Leave at once, and say what becomes of the map."""
+    run.hurry()
+    written = f"the map is being written to {options.output}; " if options.output else ""
+    _log.warning(
+        "ends without waiting for the team: %sall of it is in %s, and an agent of the same --team,"
+        " --robot and --state delivers it within %g s",
+        written,
+        state,
+        options.resume_within,
+    )
 
 
 @contextmanager
@@ -214,12 +229,14 @@ def _read_options(
         told_once(_log.warning),
         endpoints,
         odometry.topic,
+        on_news=told_once(_log.info),
     )
 
 
-def _run_on(source: ScanSource, run: AgentRun, options: argparse.Namespace) -> None:
+def _run_on(
+    source: ScanSource, run: AgentRun, stopping: StopSignals, options: argparse.Namespace
+) -> None:
     """Run on the scans chosen: a recording is played at a rate, others come when they come."""
-    stopping = stop_on_signal()
     if source.live:
         skipping = not math.isinf(options.rate)
         with scans_of(source, options.scans, skipping=skipping) as scans:

@@ -1,5 +1,6 @@
 """An agent within a program of one's own, such as a driver: it is fed scan by scan."""
 
+import logging
 import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -19,6 +20,7 @@ from mapweave.ids import check_id
 from mapweave.mapping.localization.known_map import KnownMap
 from mapweave.maps import JointMap, RobotMap
 from mapweave.scan.scan import Scan, check_beams
+from mapweave.text import shown
 from mapweave_agent.agent import AgentRun
 from mapweave_agent.by_hand.own_marks import Frame, checked
 from mapweave_agent.comparison_worker import ComparisonWorker
@@ -36,6 +38,8 @@ from mapweave_protocol.wire.keys import new_boot
 from mapweave_protocol.wire.messages import AlignmentMessage, PoseMessage
 
 T = TypeVar("T")
+
+_log = logging.getLogger(__name__)
 
 
 class Agent:
@@ -252,7 +256,7 @@ class Agent:
         earlier = EarlierRuns.of(self._team, self._robot, self._state)
         compare = partial(align, parameters=FusionParameters.of(self._config))
         session = stack.enter_context(
-            open_session(self._endpoints, patience=self._patience, link=link)
+            open_session(self._endpoints, patience=self._patience, on_wait=_tell_waiting, link=link)
         )
         comparer = stack.enter_context(ComparisonWorker(compare))
         mapper = stack.enter_context(
@@ -300,3 +304,8 @@ class Agent:
     def _check_failure(self) -> None:
         if self._failure is not None:
             raise self._failure
+
+
+def _tell_waiting(reason: str) -> None:
+    # A warning: a program that has set up no log shows it as well.
+    _log.warning("waiting for a router: %s", shown(reason, 300))

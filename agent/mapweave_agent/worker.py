@@ -1,5 +1,6 @@
 """A process beside the agent's own: what takes long must not hold tracking up."""
 
+import atexit
 import multiprocessing
 import os
 import signal
@@ -28,6 +29,7 @@ class Worker:
         self._serve = serve
         self._argument = argument
         self._start_process()
+        atexit.register(self._end_process)  # before those that are left are asked to end
 
     def __enter__(self) -> Self:
         return self
@@ -38,8 +40,8 @@ class Worker:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._process.terminate()
-        self._process.join()
+        atexit.unregister(self._end_process)
+        self._end_process()
         self._pipe.close()
 
     @property
@@ -54,14 +56,18 @@ class Worker:
         self._process = _SPAWN.Process(
             target=self._serve, args=(theirs, self._argument), daemon=True
         )
-        # Ctrl-C goes to the whole group; one that is just being born would leave a trace of it.
-        # The tracker first: where Python 3.11 starts it with the process, it unblocks the signal.
+        # What tells the whole group to end means the agent, which needs this process to the last.
+        # The tracker first: where Python 3.11 starts it with the process, it unblocks them.
         resource_tracker.ensure_running()
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         self._process.start()
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         # Only the process holds its end now: each side sees when the other one is gone.
         theirs.close()
+
+    def _end_process(self) -> None:
+        self._process.kill()
+        self._process.join()
 
 
 def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None:
@@ -73,15 +79,15 @@ def answer(pipe: Connection, niceness: int, of: Callable[[Any], object]) -> None
         How much nicer this process is than the agent. One that is to be as nice as can be, `LAST`,
         runs where nothing else would if the agent itself is as nice, to give way to it as well.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the agent ends this process itself
+    for number in (signal.SIGINT, signal.SIGTERM):  # the agent ends this process itself
+        signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _give_way(niceness)
     while True:
         try:
-            asked = pipe.recv()
-        except EOFError:
+            pipe.send(of(pipe.recv()))
+        except (EOFError, BrokenPipeError, ConnectionResetError):
             return
-        pipe.send(of(asked))
 
 
 def _give_way(niceness: int) -> None:

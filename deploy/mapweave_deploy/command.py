@@ -41,7 +41,7 @@ from mapweave_deploy.run.team_plan import Member, simulated_team, team_from_logs
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import new_token
 from mapweave_fusion_server.web.loading import live_page
-from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.link.stopping import StopSignals
 
 NAP = 0.2  # [s]
 
@@ -210,7 +210,7 @@ def _is_attended(console: Console) -> bool:
 
 def _stay(crew: ProcessGroup, plan: Plan, console: Console) -> None:
     """Let router and coordinator serve until Ctrl-C, which is the way to end this."""
-    stopping = stop_on_signal()
+    stopping = StopSignals()
     _say(console, [*page_of(crew, plan), "Router and coordinator stay; Ctrl-C ends them."])
     while not stopping():
         crew.check()

@@ -42,7 +42,7 @@ from mapweave_protocol.link.arguments import (
 from mapweave_protocol.link.security.membership import check_member
 from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.session import open_session
-from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.link.stopping import StopSignals
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 
 DEFAULT_INTERVAL: float = CoordinatorParameters().min_interval
@@ -111,7 +111,7 @@ def _run(options: argparse.Namespace) -> int:
         nullcontext() if feed is None else feed.positions.heard_on(session, team),
     ):
         gc.freeze()  # what was loaded stays: collections, in which all waits, need not look at it
-        Service(session, team, store, parameters, config, feed).run(stop_on_signal())
+        Service(session, team, store, parameters, config, feed).run(StopSignals())
     return 0
 
 

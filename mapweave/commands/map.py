@@ -4,7 +4,8 @@ import argparse
 import json
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
@@ -16,12 +17,12 @@ from mapweave.cli import (
     argument,
     config_of,
 )
-from mapweave.commands.ending import until_interrupted
+from mapweave.commands.ending import Ending, ended_in_order
 from mapweave.commands.garbage import spared
 from mapweave.commands.progress import busy, track
 from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
-from mapweave.errors import FileError
+from mapweave.errors import FileError, MapweaveError
 from mapweave.ids import check_id
 from mapweave.io.grids.map_server import is_grid, read_grid
 from mapweave.io.map_files import save
@@ -37,6 +38,15 @@ from mapweave.pictures.picture import check_picture, plot
 from mapweave.text import counted
 
 ROBOT = "r1"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Mapped:
+    """What came of `scans`; with what ended them, where that is no end."""
+
+    map: RobotMap
+    scans: int
+    failure: MapweaveError | None
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
@@ -88,13 +98,15 @@ def _run(options: argparse.Namespace) -> int:
         return _run_grid(options, config)
     source = open_source(options.log, _read_options(options, config))
     mapper = _mapper(options.robot, start, config)
-    robot_map, taken = _map_all(options, source, mapper)
-    if not taken:
-        raise FileError(_name(options), _nothing_chosen(source, options.scans))
-    _check_placed(options, _new(robot_map, start), taken)
-    _write(options, robot_map)
-    figures = _figures(_new(robot_map, start), taken)
+    # A recording is there to be mapped again: Ctrl-C gives it up.
+    with ended_in_order() if source.live else nullcontext() as ending:
+        mapped = _map_all(options, source, mapper, ending)
+        _check_placed(options, source, mapped, start)
+        _write(options, mapped.map)
+    figures = _figures(_new(mapped.map, start), mapped.scans)
     _tell(options, figures, _sentence(figures))
+    if mapped.failure is not None:
+        raise mapped.failure
     return 0
 
 
@@ -146,21 +158,38 @@ def _mapper(robot: str | None, start: Start, config: Config) -> ScanMapper:
 
 
 def _map_all(
-    options: argparse.Namespace, source: ScanSource, mapper: ScanMapper
-) -> tuple[RobotMap, int]:
-    """Map the chosen scans; return the map and how many scans there were."""
-    scans = source.count() if sys.stderr.isatty() else None
-    total = None if scans is None else options.scans.count(scans)
-    name = Path(options.log).name
+    options: argparse.Namespace, source: ScanSource, mapper: ScanMapper, ending: Ending | None
+) -> _Mapped:
+    """Map the chosen scans, as far as they can be read."""
     taken = 0
+    failure: MapweaveError | None = None
     chosen = options.scans.of(source.scans())
-    if source.live:  # nothing else may end it
-        chosen = until_interrupted(chosen)
+    if ending is not None:
+        chosen = ending.until(chosen)
     with spared():
-        for scan in track(chosen, f"mapping {name}", total):
-            mapper.add(scan)
-            taken += 1
-    return mapper.finish(), taken
+        try:
+            for scan in track(chosen, f"mapping {Path(options.log).name}", _total(options, source)):
+                mapper.add(scan)
+                taken += 1
+        except MapweaveError as error:
+            failure = error
+        if ending is not None and ending.asked:
+            _warn(_what_is_kept(options))
+        return _Mapped(mapper.finish(), taken, failure)
+
+
+def _total(options: argparse.Namespace, source: ScanSource) -> int | None:
+    """Return how many scans there will be, where a person waits for them."""
+    try:
+        scans = source.count() if sys.stderr.isatty() else None
+    except MapweaveError:  # told where it cannot be read any further
+        return None
+    return None if scans is None else int(options.scans.count(scans))
+
+
+def _what_is_kept(options: argparse.Namespace) -> str:
+    kept = [str(path) for path in (options.output, options.plot) if path is not None]
+    return "ended: what came until now is mapped" + (f", for {' and '.join(kept)}" if kept else "")
 
 
 def _new(robot_map: RobotMap, start: Start) -> RobotMap:
@@ -168,18 +197,24 @@ def _new(robot_map: RobotMap, start: Start) -> RobotMap:
     return replace(robot_map, submaps=robot_map.submaps[start.submaps :])
 
 
-def _check_placed(options: argparse.Namespace, new: RobotMap, taken: int) -> None:
-    if new.submaps:
+def _check_placed(
+    options: argparse.Namespace, source: ScanSource, mapped: _Mapped, start: Start
+) -> None:
+    if mapped.scans and _new(mapped.map, start).submaps:
         return
+    if mapped.failure is not None:
+        raise mapped.failure
+    if not mapped.scans:
+        raise FileError(_name(options), _nothing_chosen(source, options.scans))
     if options.localize is not None:
         raise FileError(
             _name(options),
-            f"none of its {taken} chosen scans can be found in {options.localize}; expected some"
-            " metres of a drive in a place that it shows",
+            f"none of its {mapped.scans} chosen scans can be found in {options.localize}; expected"
+            " some metres of a drive in a place that it shows",
         )
     raise FileError(
         _name(options),
-        f"none of its {taken} chosen scans can be mapped; expected scans whose"
+        f"none of its {mapped.scans} chosen scans can be mapped; expected scans whose"
         " returns are dense enough to show walls",
     )
 

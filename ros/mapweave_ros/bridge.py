@@ -2,7 +2,9 @@
 
 import argparse
 import logging
+import math
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 
 from mapweave.cli import Command
@@ -10,7 +12,7 @@ from mapweave.errors import ArgumentError
 from mapweave.maps import JointMap
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.security.settings import LinkSettings
-from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.link.stopping import StopSignals
 from mapweave_protocol.link.subscriber import joint_maps, poses
 from mapweave_protocol.narration.logs import add_log_arguments, begin_log
 from mapweave_protocol.wire.messages import PoseMessage
@@ -21,6 +23,7 @@ from mapweave_ros.output import Ros2Output
 
 POLL = 0.1  # [s] after which a signal is noticed
 FAREWELL = 2.0  # [s] for a session to be closed
+PATIENCE = 5.0  # [s] after which it is said what nothing is heard of
 
 _log = logging.getLogger(__name__)
 
@@ -42,7 +45,7 @@ def _run(options: argparse.Namespace) -> int:
     begin_log(options, "bridge")
     team, endpoints, link = connection_of(options)
     with _output(options.to, team, endpoints) as output:
-        _Following(team, endpoints, link, output).run(stop_on_signal())
+        _Following(team, endpoints, link, output).run(StopSignals())
     return 0
 
 
@@ -71,6 +74,7 @@ class _Following:
         self._team = team
         self._from = {"connect": endpoints, "link": link}
         self._output = output
+        self._shown: set[str] = set()
         self._over = threading.Event()
         self._failure: BaseException | None = None
 
@@ -89,8 +93,11 @@ class _Following:
         ]
         for thread in threads:
             thread.start()
+        waits = time.monotonic() + PATIENCE
         while not (stopping() or self._over.wait(POLL)):
-            pass
+            if time.monotonic() > waits:
+                waits = math.inf
+                self._tell_missing()
         self._over.set()
         for thread in threads:
             thread.join(FAREWELL)
@@ -100,10 +107,30 @@ class _Following:
     def _follow(self, subscribe: Callable[..., Iterator[JointMap | PoseMessage]]) -> None:
         try:
             for news in subscribe(self._team, **self._from, stopping=self._over.is_set):
+                self._tell_shown(news)
                 self._output.tell(news)
         except BaseException as error:  # noqa: BLE001 - raised again where it is seen
             self._failure = error
             self._over.set()
+
+    def _tell_missing(self) -> None:
+        if not self._shown:
+            _log.warning(
+                "nothing yet of team %s: waits for a joint map, which mapweave server makes, and"
+                " for robots; mapweave watch --team %s tells who is there",
+                self._team,
+                self._team,
+            )
+
+    def _tell_shown(self, news: JointMap | PoseMessage) -> None:
+        """Say of each kind of news once that it is shown."""
+        if isinstance(news, JointMap):
+            kind, what = "joint map", f"the joint map, from version {news.version} on"
+        else:
+            kind = what = f"where {news.robot} is"
+        if kind not in self._shown:
+            self._shown.add(kind)
+            _log.info("shows %s", what)
 
 
 command = Command(

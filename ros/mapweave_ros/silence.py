@@ -34,7 +34,7 @@ class Silence:
         Of ROS 2.
     announced
         Returns domain and name of each topic that somebody announces, of a type.
-    tell
+    tell, tell_news
         Told which topic is silent, and when it is no longer.
     clock
         Returns the time [s].
@@ -46,12 +46,14 @@ class Silence:
         domain: int,
         announced: Callable[[str], list[tuple[int, str]]],
         tell: Callable[[str], None],
+        tell_news: Callable[[str], None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._expected = expected
         self._domain = domain
         self._announced = announced
         self._tell = tell
+        self._tell_news = tell_news
         self._clock = clock
         self._last = dict.fromkeys(expected, clock())
         self._came: set[str] = set()
@@ -65,7 +67,7 @@ class Silence:
         self._came.add(topic)
         if topic in self._told:
             self._told.remove(topic)
-            self._tell(f"{topic} is heard now")
+            self._tell_news(f"{topic} is heard now")
 
     def check(self) -> None:
         """Tell of each topic that has been silent for `SILENT`."""

@@ -42,7 +42,7 @@ def open_ros2(name: str, options: ReadOptions) -> "Ros2Source":
         If `rosbags` is not installed.
     """
     address = Ros2Address.parse(name, options.network)
-    return Ros2Source(address, options.on_warning, options.odometry_topic)
+    return Ros2Source(address, options.on_warning, options.odometry_topic, options.on_news)
 
 
 class Ros2Source:
@@ -56,6 +56,8 @@ class Ros2Source:
         Told what is refused, and where nothing comes.
     odometry
         The topic of odometry on the same network that may help; None for none.
+    on_news
+        Told where a laser sits, and when one is heard again.
     """
 
     live = True
@@ -65,10 +67,12 @@ class Ros2Source:
         address: Ros2Address,
         on_warning: Callable[[str], None],
         odometry: str | None = None,
+        on_news: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._address = address
         self._odometry = odometry
         self._tell = on_warning
+        self._tell_news = on_news
         self._messages = ScanMessages()
         self._closed = threading.Event()
         self.frames = RobotFrames()
@@ -89,7 +93,9 @@ class Ros2Source:
                 return
             domain = self._address.network.domain
             topics = [_Topic(laser, domain, self._tell) for laser in self._lasers]
-            beside = BesideScans(self._messages, domain, self.frames, self._odometry, self._tell)
+            beside = BesideScans(
+                self._messages, domain, self.frames, self._odometry, self._tell, self._tell_news
+            )
             beside.subscribe(session, inbox.put, stack)
             self._hear_transforms(inbox, beside)
             for key in (key for topic in topics for key in topic.keys):
@@ -120,6 +126,7 @@ class Ros2Source:
             self._address.network.domain,
             lambda kind: topics_of_type(session, dds_type_of(kind), POLL),
             self._tell,
+            self._tell_news,
         )
 
     def _heard(

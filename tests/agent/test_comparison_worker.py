@@ -109,6 +109,17 @@ def test_a_process_that_was_killed_is_an_outcome_and_is_replaced() -> None:
     assert "-9" in outcomes[0].failure
 
 
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_what_tells_the_whole_group_to_end_is_the_agents_to_hear(how: signal.Signals) -> None:
+    with ComparisonWorker(operator.mul) as comparer:
+        os.kill(comparer.pid, how)
+        comparer.start(COMPARISON)
+        assert "TypeError" in outcome_of(comparer).failure
+        os.kill(comparer.pid, how)  # also one that is at work
+        comparer.start(COMPARISON)
+        assert "TypeError" in outcome_of(comparer).failure
+
+
 def test_the_process_ends_with_its_context() -> None:
     with ComparisonWorker(align) as comparer:
         pid = comparer.pid

@@ -1,6 +1,7 @@
 """An agent that a program feeds, and one that lines on standard input do, around a real router."""
 
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -149,21 +150,51 @@ def test_a_robot_that_drives_before_there_is_a_router_maps_and_is_in_its_team_on
     assert listener.statuses["a"].scans_seen == SCANS
 
 
-def test_a_robot_whose_router_never_comes_leaves_its_map_when_it_is_interrupted(
-    team: str, logs: list[Path], tmp_path: Path
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_robot_whose_router_never_comes_leaves_its_map_when_its_group_is_told_twice_to_end(
+    team: str, logs: list[Path], tmp_path: Path, how: signal.Signals
 ) -> None:
     file = tmp_path / "r1.json"
     where = ["--robot", "a", "--team", team, "--connect", "tcp/127.0.0.1:1", "--source", "-"]
     where += ["--rate", "max", "--output", str(file)]
-    with subprocess.Popen([MAPWEAVE, "agent", *where], stdin=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [MAPWEAVE, "agent", *where],
+        stdin=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
         assert process.stdin is not None
         process.stdin.write("".join(f"{as_line(scan)}\n" for scan in scans_of(logs[0])))
         process.stdin.flush()
         state = StateFolder(default_folder(team, "a"))
         until(lambda: bool(state.runs("a", time.time())))
-        process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE) == 0
+        for _ in range(2):  # as `timeout` does: the process, and then its group
+            os.killpg(process.pid, how)
+            time.sleep(0.05)
+        _, said = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0
+    assert "ERROR" not in said and "Traceback" not in said
     assert read_map(file).submaps
+
+
+def test_what_came_before_a_source_failed_is_in_the_map_that_an_agent_leaves(
+    team: str, logs: list[Path], tmp_path: Path
+) -> None:
+    file, scans = tmp_path / "r1.json", scans_of(logs[0])
+    where = ["--robot", "a", "--team", team, "--connect", "tcp/127.0.0.1:1", "--source", "-"]
+    lines = [*map(as_line, scans), '{"format": "mapweave/scans/2"}']
+    done = subprocess.run(
+        [MAPWEAVE, "agent", *where, "--rate", "max", "--output", file],
+        input="\n".join(lines),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 1
+    assert f"standard input: line {SCANS + 1} is of format" in done.stderr.splitlines()[-1]
+    assert last_scan(read_map(file)) == SCANS - 1
 
 
 def test_what_is_wrong_with_standard_input_ends_the_agent_in_one_line(
@@ -179,7 +210,7 @@ def test_what_is_wrong_with_standard_input_ends_the_agent_in_one_line(
         timeout=PATIENCE,
     )
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith("mapweave: standard input: is of format")
+    assert done.stderr.splitlines()[-1].startswith("mapweave: standard input: line 1 is of format")
     assert "Traceback" not in done.stderr
 
 

@@ -52,7 +52,10 @@ def taking(
     endpoint: str, word: str, told: list[str], odometry_topic: str | None = None
 ) -> Iterator[Taken]:
     options = ReadOptions(
-        on_warning=told.append, network=(endpoint,), odometry_topic=odometry_topic
+        on_warning=told.append,
+        on_news=told.append,
+        network=(endpoint,),
+        odometry_topic=odometry_topic,
     )
     with Taken(open_ros2(word, options)).running() as taken:
         yield taken

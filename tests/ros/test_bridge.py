@@ -72,3 +72,19 @@ def test_a_place_to_show_a_team_that_is_none_is_refused_with_those_there_are(
     assert main(["bridge", "--to", "foxglove"]) == 1
     said = capsys.readouterr().err
     assert said.endswith("expected ros2:, or foxglove:PORT such as foxglove:8765, got 'foxglove'\n")
+
+
+def test_a_bridge_to_a_team_that_is_not_there_says_what_it_waits_for(
+    endpoint: str, team: str
+) -> None:
+    reached = ("--team", team, "--connect", endpoint)
+    with subprocess.Popen(
+        [MAPWEAVE, "bridge", *reached, "--to", "ros2:?domain=31"],
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stderr is not None
+        said = next(line for line in process.stderr if "nothing yet" in line)
+        process.terminate()
+        process.wait(PATIENCE)
+    assert f"nothing yet of team {team}: waits for a joint map, which mapweave server" in said

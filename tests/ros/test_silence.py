@@ -23,6 +23,7 @@ class Watched:
             2,
             lambda kind: (there or []) if kind == SCAN else [],
             self.told.append,
+            self.told.append,
             lambda: self.now,
         )
 

@@ -13,7 +13,7 @@ from mapweave_protocol.link.arguments import add_link_arguments, link_of
 from mapweave_protocol.link.security.membership import check_member
 from mapweave_protocol.link.security.roster import Member, Role
 from mapweave_protocol.link.session import router_config
-from mapweave_protocol.link.stopping import stop_on_signal
+from mapweave_protocol.link.stopping import StopSignals
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 ENCRYPTED_LISTEN = "tls/127.0.0.1:7447"
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         _check_here(endpoints)
     if link.keys is not None:
         check_member(link, Member(link.keys.member.team, Role.ROUTER, Role.ROUTER.value))
-    stopping = stop_on_signal()
+    stopping = StopSignals()
     with _open(endpoints, config):
         print(f"router: listening at {', '.join(endpoints)}", file=sys.stderr)  # noqa: T201
         while not stopping():

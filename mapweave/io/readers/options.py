@@ -22,6 +22,8 @@ class ReadOptions:
         Of a bag: the laser's topic, such as ``/scan``; None takes the only one there is.
     on_warning
         Called once, after the last scan, if something was left out; of a live source, when it is.
+    on_news
+        Of a live source: told what is no cause for concern.
     odometry_topic
         Of a bag or a ROS 2 network: where odometry is said, such as ``/odom`` or ``/tf``; None
         takes the only one of a bag, where `odometry` asks for it.
@@ -38,6 +40,7 @@ class ReadOptions:
     network: tuple[str, ...] | None = None
     odometry_topic: str | None = None
     on_laser: Callable[[str, StaticFrames], None] | None = None
+    on_news: Callable[[str], None] = lambda _: None
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,7 @@ def read_scan_lines(
         for line in lines:
             try:
                 content = _content(line)
-                if content is None or _is_header(name, content):
+                if content is None or _is_header(name, line.number, content):
                     continue
                 tally.pieces += 1
                 scan = _scan(tally.scans, content, odometry=options.odometry)
@@ -88,11 +88,11 @@ def _content(line: Line) -> dict[str, Any] | None:
     return content
 
 
-def _is_header(name: Path | str, content: dict[str, Any]) -> bool:
+def _is_header(name: Path | str, number: int, content: dict[str, Any]) -> bool:
     if "format" not in content:
         return False
     if content["format"] != SCANS_FORMAT:
-        raise FileError(name, f"is of format {content['format']!r}; {EXPECTED}")
+        raise FileError(name, f"line {number} is of format {content['format']!r}; {EXPECTED}")
     return "ranges" not in content
 
 

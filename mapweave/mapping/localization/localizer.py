@@ -95,7 +95,8 @@ class Localizer:
     searcher
         Looks for places; by default here, which takes some 0.1 s each time.
     on_news
-        Told in words when the robot has found itself, and when it no longer knows where it is.
+        Told in words when the robot has found itself, when it no longer knows where it is, and
+        when nothing that it recalls is found.
     """
 
     def __init__(
@@ -132,6 +133,7 @@ class Localizer:
         self._place: Place | None = None
         self._candidate: tuple[Place, int] | None = None  # found once, at which kept scan
         self._unconfirmed = 0  # searches in a row that did not find the place again
+        self._is_missed = False  # told that nothing is found
         self._waiting: list[_Step] = []  # tracked since track was lost, and not yet located
         self._path: list[_Located] = []
 
@@ -250,6 +252,7 @@ class Localizer:
         p, now = self.parameters, self._recollection.count
         if found is None:
             self._candidate = None
+            self._tell_missed(now)
             return
         before, since = self._candidate or (found, now)
         if found.differs(before, pose, p.agreement, p.agreed_turn):
@@ -258,9 +261,20 @@ class Localizer:
         if now - since < p.every:
             return
         self._place, self._candidate, self._unconfirmed = found, None, 0
+        self._is_missed = False
         self._tell(f"the robot has found itself in component {found.component} of the map")
         self._path += [_located(step, found) for step in self._waiting]
         self._waiting = []
+
+    def _tell_missed(self, kept: int) -> None:
+        """Say once that a drive as long as is recalled, of `kept` scans, was found nowhere."""
+        if self._is_missed or kept < self.parameters.finder.recent.kept:
+            return
+        self._is_missed = True
+        self._tell(
+            "nothing that the robot saw is found in the map: it is of another place, or that has"
+            " changed; the robot has no pose until it is where the map shows"
+        )
 
     def _lose(self) -> None:
         """Forget where the robot is: it may be anywhere."""

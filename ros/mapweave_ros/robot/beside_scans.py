@@ -48,7 +48,7 @@ class BesideScans:
         Take what is said of transforms; of those that change where they are followed.
     odometry
         Its topic, such as ``/odom``, or one called ``tf``; None for none.
-    tell
+    tell, tell_news
         Told what is refused, and what of a laser's place is found.
     """
 
@@ -59,9 +59,11 @@ class BesideScans:
         frames: RobotFrames,
         odometry: str | None,
         tell: Callable[[str], None],
+        tell_news: Callable[[str], None],
     ) -> None:
         self._messages = messages
         self._tell = tell
+        self._tell_news = tell_news
         self._frames = frames
         self._track = OdometryTrack(REMEMBERED)
         self._asked = odometry
@@ -114,10 +116,11 @@ class BesideScans:
             return None
         if found is not None:
             upside_down = ", upside down" if found.upside_down else ""
-            self._tell_once(
+            news = (
                 f"{topic} sits at {found.x:.2f} m, {found.y:.2f} m, {found.degrees:.0f}°"
                 f"{upside_down}, by {TF_STATIC}"
             )
+            self._tell_once(news, self._tell_news)
         return found
 
     def with_odometry(self, scan: Scan, mounting: Mounting) -> Scan:
@@ -133,10 +136,10 @@ class BesideScans:
             return scan
         return replace(scan, odometry=se2.compose(robot, [mounting.x, mounting.y, 0.0]))
 
-    def _tell_once(self, message: str) -> None:
+    def _tell_once(self, message: str, tell: Callable[[str], None] | None = None) -> None:
         if message not in self._said:
             self._said.add(message)
-            self._tell(message)
+            (tell or self._tell)(message)
 
 
 class _Heard:

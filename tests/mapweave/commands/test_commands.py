@@ -41,10 +41,11 @@ from tests.mapweave.buildings import (
 SCANS = 12
 
 
-def mapweave(*words: str | Path) -> subprocess.CompletedProcess[str]:
+def mapweave(*words: str | Path, typed: str = "") -> subprocess.CompletedProcess[str]:
     """Run the installed program."""
     return subprocess.run(
         [sys.executable, "-m", "mapweave", *map(str, words)],
+        input=typed,
         capture_output=True,
         text=True,
         timeout=120,
@@ -252,13 +253,14 @@ def test_scans_on_standard_input_make_the_map_that_their_log_does(
     assert len(read_map(from_file).submaps[0].trajectory.scan_index) == SCANS
 
 
-def test_ctrl_c_ends_scans_that_come_live_and_their_map_is_written(
-    scans: list[Scan], tmp_path: Path
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_told_twice_ends_scans_that_come_live_and_their_map_is_written(
+    scans: list[Scan], tmp_path: Path, how: signal.Signals
 ) -> None:
     output = tmp_path / "map.json"
     program = [sys.executable, "-m", "mapweave", "map", "-", "--output", str(output)]
     with subprocess.Popen(
-        program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as driven:
         assert driven.stdin is not None
         driven.stdin.write("".join(f"{as_line(scan)}\n" for scan in scans))
@@ -268,11 +270,32 @@ def test_ctrl_c_ends_scans_that_come_live_and_their_map_is_written(
             time.sleep(0.1)
             fcntl.ioctl(driven.stdin, termios.FIONREAD, waiting)
         time.sleep(1.0)
-        driven.send_signal(signal.SIGINT)
-        said, _ = driven.communicate()
+        driven.send_signal(how)
+        time.sleep(0.05)
+        driven.send_signal(how)
+        said, told = driven.communicate()
     assert driven.returncode == 0
     assert "scans placed" in said
+    assert told == f"mapweave: ended: what came until now is mapped, for {output}\n"
     assert read_map(output).submaps
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_what_came_before_a_line_of_another_format_is_mapped_and_the_line_is_named(
+    scans: list[Scan], tmp_path: Path, live: bool
+) -> None:
+    lines = [*map(as_line, scans), '{"format": "mapweave/scans/2"}', *map(as_line, scans)]
+    file, output = tmp_path / "scans.jsonl", tmp_path / "map.json"
+    file.write_text("\n".join(lines))
+    if live:
+        done = mapweave("map", "-", "--output", output, typed=file.read_text())
+    else:
+        done = main_here("map", file, "--output", output)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    name = "standard input" if live else file
+    what = f"line {SCANS + 1} is of format 'mapweave/scans/2'"
+    assert done.stderr.startswith(f"mapweave: {name}: {what}")
+    assert len(read_map(output).submaps[0].trajectory.scan_index) == SCANS
 
 
 def test_a_missing_log_and_a_folder_fail_in_one_line(tmp_path: Path) -> None:

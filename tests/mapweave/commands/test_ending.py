@@ -1,4 +1,4 @@
-"""Ctrl-C ends what comes live, and keeps what came."""
+"""Ctrl-C, or the word to terminate, ends what comes live, and keeps what came."""
 
 import os
 import signal
@@ -7,48 +7,59 @@ from collections.abc import Iterator
 
 import pytest
 
-from mapweave.commands.ending import until_interrupted
+from mapweave.commands.ending import STOP_SIGNALS, ended_in_order
 
 NEVER = 60.0  # [s]
 
-
-def press() -> None:
-    os.kill(os.getpid(), signal.SIGINT)
+either = pytest.mark.parametrize("how", STOP_SIGNALS)
 
 
-def waited_for(count: int) -> Iterator[int]:
-    """Yield numbers, then have Ctrl-C pressed while the next is waited for."""
+def tell(how: signal.Signals) -> None:
+    os.kill(os.getpid(), how)
+    time.sleep(0.01)
+
+
+def waited_for(count: int, how: signal.Signals) -> Iterator[int]:
+    """Yield numbers, then have the signal come while the next is waited for."""
     yield from range(count)
-    press()
+    tell(how)
     time.sleep(NEVER)
     yield count
 
 
-def test_what_comes_to_its_end_is_all_there_and_ctrl_c_is_as_it_was() -> None:
-    before = signal.getsignal(signal.SIGINT)
-    assert list(until_interrupted(iter(range(3)))) == [0, 1, 2]
-    assert signal.getsignal(signal.SIGINT) is before
+@either
+def test_what_comes_to_its_end_is_all_there_and_signals_are_as_they_were(
+    how: signal.Signals,
+) -> None:
+    before = signal.getsignal(how)
+    with ended_in_order() as ending:
+        assert list(ending.until(iter(range(3)))) == [0, 1, 2]
+    assert not ending.asked
+    assert signal.getsignal(how) is before
 
 
-def test_ctrl_c_ends_the_waiting_and_all_that_came_is_there() -> None:
-    before = signal.getsignal(signal.SIGINT)
-    assert list(until_interrupted(waited_for(3))) == [0, 1, 2]
-    assert signal.getsignal(signal.SIGINT) is before
+@either
+def test_a_signal_ends_the_waiting_and_all_that_came_is_there(how: signal.Signals) -> None:
+    with ended_in_order() as ending:
+        assert list(ending.until(waited_for(3, how))) == [0, 1, 2]
+    assert ending.asked
 
 
-def test_what_is_being_done_when_ctrl_c_comes_is_done_to_its_end() -> None:
+@either
+def test_what_is_being_done_when_a_signal_comes_is_done_to_its_end(how: signal.Signals) -> None:
     done = []
-    for item in until_interrupted(iter(range(3))):
-        press()
-        time.sleep(0.01)
-        done.append(item)
+    with ended_in_order() as ending:
+        for item in ending.until(iter(range(3))):
+            tell(how)
+            done.append(item)
     assert done == [0]
 
 
-def test_a_second_ctrl_c_interrupts() -> None:
-    with pytest.raises(KeyboardInterrupt):
-        for _ in until_interrupted(iter(range(3))):
-            press()
-            time.sleep(0.01)
-            press()
-            time.sleep(NEVER)
+@either
+def test_a_signal_that_is_told_again_changes_nothing(how: signal.Signals) -> None:
+    done: list[object] = []
+    with ended_in_order() as ending:
+        done.extend(ending.until(waited_for(3, how)))
+        tell(how)
+        done.append("written")
+    assert done == [0, 1, 2, "written"]

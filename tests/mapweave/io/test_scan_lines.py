@@ -90,7 +90,9 @@ def test_whatever_a_line_holds_the_others_are_read(text: bytes) -> None:
 
 
 def test_another_format_is_refused() -> None:
-    with pytest.raises(FileError, match=r"^here: is of format 'mapweave/scans/2'; expected lines"):
+    with pytest.raises(
+        FileError, match=r"^here: line 1 is of format 'mapweave/scans/2'; expected lines"
+    ):
         read({"format": "mapweave/scans/2"}, LINE)
 
 

@@ -97,11 +97,15 @@ def test_what_is_marked_in_the_known_map_stays_where_it_is() -> None:
     np.testing.assert_allclose(placed.position, [3.0, 4.0])
 
 
-def test_a_robot_in_another_building_is_nowhere() -> None:
-    localizer = Localizer(KnownMap.of(stored(part(OTHER_BUILDING, 0, 26), np.zeros(3))))
+def test_a_robot_in_another_building_is_nowhere_which_is_said_once() -> None:
+    news: list[str] = []
+    known = KnownMap.of(stored(part(OTHER_BUILDING, 0, 26), np.zeros(3)))
+    localizer = Localizer(known, on_news=news.append)
     found = follow(localizer, scans_along(BUILDING, FROM_THE_LEFT, 5)[0])
     assert not any(placement.placed for placement in found)
     assert localizer.finish().submaps[1:] == ()
+    (line,) = news
+    assert line.startswith("nothing that the robot saw is found in the map: it is of another place")
 
 
 def test_where_two_places_look_alike_the_robot_says_nothing_until_it_sees_a_difference() -> None:
