@@ -156,6 +156,8 @@ class Submap:
         Lines and free space, submap frame.
     trajectory
         Of the scans mapped here, submap frame.
+    joined
+        (n,) how sure each wall is, where it is a component of a joint map; None of what was mapped.
     """
 
     id: int
@@ -163,6 +165,7 @@ class Submap:
     pose: FloatArray
     map: LineMap
     trajectory: Trajectory
+    joined: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -124,7 +124,7 @@ class JointMapBuilder:
             poses = {name: list(those) for name, those in woven.items()}
         pieces = {
             name: [
-                Piece(s.map, self._witness(s.map), pose)
+                Piece(s.map, self._witness(s.map), pose, s.joined)
                 for s, pose in zip(submaps[name], those, strict=True)
             ]
             for name, those in poses.items()
