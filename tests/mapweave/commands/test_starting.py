@@ -242,3 +242,25 @@ def test_a_stored_joint_map_that_is_fused_with_an_unrelated_map_stays_as_it_was(
     np.testing.assert_allclose(after.segment_confidence, before.segment_confidence, atol=1e-3)
     for ring, other in zip(after.map.free_space, before.map.free_space, strict=True):
         np.testing.assert_allclose(ring, other, atol=1e-3)
+
+
+def test_a_robot_that_only_followed_in_a_map_is_no_second_witness_of_its_walls(
+    tmp_path: Path,
+) -> None:
+    a = seen("a", part(BUILDING, 0, 18), 0, tmp_path)
+    b = seen("b", part(BUILDING, 10, 30), 2, tmp_path)
+    known = read_map(a)
+    driven = Trajectory(np.arange(3), np.arange(3.0), np.zeros((3, 3)))
+    path = Submap(1, 0, np.zeros(3), LineMap.empty(), driven)
+    located, output, mapped = (tmp_path / f"{name}.json" for name in ("loc", "out", "mapped"))
+    write_map(located, replace(known, robot="r", submaps=(*known.submaps, path)))
+    assert main_here("fuse", a, b, "--output", mapped).returncode == 0
+    done = main_here("fuse", located, b, "--output", output)
+    assert (done.returncode, "only followed" in done.stderr) == (0, True)
+    assert "accepted" in done.stdout and "follows in" in done.stdout
+    (one,), (other,) = read_joint(output).components, read_joint(mapped).components
+    once = read_map(b).submaps[0].map.support.max()
+    assert one.map.support.max() == once < other.map.support.max()
+    between = se2.between(one.robots["b/0"], one.robots["r/0"])
+    expected = se2.between(other.robots["b/0"], other.robots["a/0"])
+    np.testing.assert_allclose(between, expected, atol=0.05)
