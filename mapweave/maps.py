@@ -155,6 +155,8 @@ class Submap:
         Lines and free space, submap frame.
     trajectory
         Of the scans mapped here, submap frame.
+    joined
+        (n,) how sure each wall is, where it is a component of a joint map; None of what was mapped.
     """
 
     id: int
@@ -162,6 +164,7 @@ class Submap:
     pose: FloatArray
     map: LineMap
     trajectory: Trajectory
+    joined: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,6 +2,8 @@
 
 import argparse
 import json
+import sys
+from collections.abc import Sequence
 from itertools import combinations, product
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from mapweave.config import Config
 from mapweave.errors import FileError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.io.map_files import alignment_content, load, save
+from mapweave.mapping.localization.followed import joined_by, path_followed
 from mapweave.maps import Alignment, JointMap, RobotMap, parse_component
 from mapweave.pictures.picture import check_picture, plot
 from mapweave.team.joint_map import fuse
@@ -39,9 +42,14 @@ def _run(options: argparse.Namespace) -> int:
     inputs = [options.first, *options.others]
     check_outputs([options.output, options.plot], inputs)
     given = _read_distinct(inputs)
-    maps = [m for some in given for m in _as_maps(some)]
+    followed = _followed(given)
+    paths = {path.robot: path for _, path in followed}
+    maps = [paths.get(m.robot, m) for some in given for m in _as_maps(some)]
     stored = [some for some in given if isinstance(some, JointMap)]
     alignments = _compared(given, config)
+    for known, path in followed:
+        _warn_followed(known)
+        alignments = joined_by(alignments, known, path)
     with busy("joining"):
         joint = with_members(fuse(maps, alignments, config), stored)
     if options.output:
@@ -81,11 +89,27 @@ def _as_maps(some_map: RobotMap | JointMap) -> list[RobotMap]:
     return [some_map] if isinstance(some_map, RobotMap) else as_robot_maps(some_map)
 
 
+def _followed(given: Sequence[RobotMap | JointMap]) -> list[tuple[RobotMap, RobotMap]]:
+    """Return the maps of robots that only followed in a stored one, each with the path driven."""
+    mapped = [some for some in given if isinstance(some, RobotMap)]
+    return [(m, path) for m in mapped if (path := path_followed(m)) is not None]
+
+
+def _warn_followed(followed: RobotMap) -> None:
+    """Say that walls of others' making are not counted."""
+    print(  # noqa: T201
+        f"mapweave: robot {followed.robot!r} only followed in a stored map: the walls of that map"
+        " are no second witness and are not counted; give that map as well to have them",
+        file=sys.stderr,
+    )
+
+
 def _compared(given: list[RobotMap | JointMap], config: Config) -> list[Alignment]:
     """Compare all pairs of what is `given`; what is in one joint map was compared then."""
     pairs = [
         pair
         for one, other in combinations(given, 2)
+        if len(_followed([one, other])) < 2  # walls of others' making, both
         for pair in product(_as_maps(one), _as_maps(other))
     ]
     parameters = FusionParameters.of(config)

@@ -88,6 +88,16 @@ def select(
     )
 
 
+def unsettled(known: FloatArray, evidence: Sightings, parameters: SelectionParameters) -> Sightings:
+    """Return what of the `evidence` none of the (n, 4) `known` walls [m] explains or denies."""
+    if not len(known):
+        return evidence
+    near = bearing(known, evidence, parameters)
+    left = np.ones(len(evidence), dtype=np.bool_)
+    left[near.sample[explained(near, parameters) | shadowed(near, parameters)]] = False
+    return evidence.those(left)
+
+
 def explained(near: Nearness, parameters: SelectionParameters) -> BoolArray:
     """Return (k,) which pairs are of a segment and what it explains."""
     return np.asarray(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapweave.geometry.arrays import FloatArray, IntArray
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.geometry.segments import sample
 from mapweave.kernels.lines.evidence import gather, near_pairs
 
@@ -63,6 +63,10 @@ class Sightings:
             self.points, self.directions, self.weights, self.spacing / 2, DIRECTION_BINS
         )
         return Sightings(points, directions, weights, self.spacing)
+
+    def those(self, kept: BoolArray) -> "Sightings":
+        """Return the samples that are `kept` (n,)."""
+        return Sightings(self.points[kept], self.directions[kept], self.weights[kept], self.spacing)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,14 @@ from mapweave.lines.corner_junctions import JoiningParameters, join_corners
 from mapweave.lines.directions import main_directions
 from mapweave.lines.fitting import FittingParameters, cut, fit, follow, trim
 from mapweave.lines.merging import MergingParameters, evolve
-from mapweave.lines.selection import SelectionParameters, bearing, explained, select, shadowed
+from mapweave.lines.selection import (
+    SelectionParameters,
+    bearing,
+    explained,
+    select,
+    shadowed,
+    unsettled,
+)
 from mapweave.lines.sightings import Nearness, Sightings
 from mapweave.lines.t_junctions import WallEndParameters, meet_walls
 from mapweave.parameters import StageParameters, derived
@@ -46,6 +53,7 @@ def simplify(
     counts: IntArray,
     free: BaseGeometry,
     parameters: SimplificationParameters | None = None,
+    known: FloatArray | None = None,
 ) -> FloatArray:
     """Return the fewest segments that explain nearly all that was seen.
 
@@ -61,23 +69,28 @@ def simplify(
         What was seen through: no wall grows into it.
     parameters
         Of each step.
+    known
+        (k, 4) [m], the same frame: walls that are there already. Only what they leave unexplained
+        is to be explained.
 
     Returns
     -------
     FloatArray
-        (m, 4) [m], directed, the one that explains most first.
+        (m, 4) [m], directed, the one that explains most first; none of those known.
     """
     p = parameters or SimplificationParameters()
+    known = np.empty((0, 4)) if known is None else known
     if not len(merged):
         return np.empty((0, 4))
     evidence = Sightings.of(sightings, counts, p.spacing).gathered()
     price = p.selection.price * evidence.weights.sum() / max(_wall(merged), 1e-9)
+    evidence = unsettled(known, evidence, p.selection)
     _, lengths = units(sightings)
     directions = main_directions(sightings, lengths * counts, p.merging.directions)
     candidates = _placed(merged, evidence, directions, free, p)
     near = bearing(candidates, evidence, p.selection)
     chosen = select(len(candidates), near, evidence, price, p.selection)
-    missed = _missed(candidates[chosen], sightings, p)
+    missed = unexplained(np.concatenate([known, candidates[chosen]]), sightings, p)
     if missed.any():
         again = _proposed_again(sightings[missed], counts[missed], p)
         others = _placed(again, evidence, directions, free, p)
@@ -142,8 +155,11 @@ def _proposed_again(
     return merged[_is_long(merged, p)]
 
 
-def _missed(chosen: FloatArray, sightings: FloatArray, p: SimplificationParameters) -> BoolArray:
-    """Return (k,) which sightings the chosen explain too little of."""
+def unexplained(
+    chosen: FloatArray, sightings: FloatArray, parameters: SimplificationParameters
+) -> BoolArray:
+    """Return (k,) which `sightings` (k, 4) [m] the `chosen` (n, 4) [m] explain too little of."""
+    p = parameters
     points, directions, lengths, owner = sample(sightings, 2 * p.spacing)
     near = Nearness.of(chosen, points, directions, p.selection.tolerance)
     known = np.zeros(len(points), dtype=np.bool_)

@@ -1,7 +1,7 @@
 """One component of a joint map: the walls of all that was joined, merged (paper, VI and VII)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -16,12 +16,14 @@ from mapweave.lines.simplification import SimplificationParameters, simplify, so
 from mapweave.maps import JointComponent, LineMap
 from mapweave.matching.distance_field import DistanceFieldParameters
 from mapweave.parameters import StageParameters, derived
-from mapweave.scan.free_space import FreeSpaceParameters, rings, unite
+from mapweave.scan.free_space import FreeSpaceParameters, from_rings, rings, unite
 from mapweave.team.alignment_graph import AlignmentGraphParameters, Cluster
 from mapweave.team.recent import Recent
+from mapweave.team.walls.joined_before import Seen, staying
 from mapweave.team.walls.merging_tree import KnownMergings, Walls, merge_all
 from mapweave.team.walls.segment_confidence import (
     SegmentConfidenceParameters,
+    Voices,
     Witness,
     segment_confidence,
 )
@@ -59,11 +61,14 @@ class Piece:
         What they say of walls; None where no wall was seen.
     pose
         (3,) of their frame in the component's [m, m, rad].
+    joined
+        (n,) how sure each wall is, where it is a component of a joint map; None of what was mapped.
     """
 
     lines: LineMap
     witness: Witness | None
     pose: FloatArray
+    joined: FloatArray | None = None
 
 
 class Kept:
@@ -90,17 +95,17 @@ class Placed:
     pose
         (3,) [m, m, rad].
     walls
-        Its segments, merged.
+        Its segments, merged; None of what was joined before.
     seen
-        (n, 4) its segments [m] as they are.
-    free_space
-        Its rings.
+        Its lines as they are.
+    joined
+        (n,) how sure each wall is, if it was joined before.
     """
 
     pose: FloatArray
-    walls: Walls
-    seen: FloatArray
-    free_space: tuple[FloatArray, ...]
+    walls: Walls | None
+    seen: LineMap
+    joined: FloatArray | None
 
 
 class Laid(NamedTuple):
@@ -135,29 +140,74 @@ def join(
         for name, frame in cluster.poses.items()
     )
     # Gone through every time, so that what was merged is kept as well.
-    merged = _merged([[each.placed.walls for each in those] for those in laid], p, kept)
+    walls = [
+        [each.placed.walls for each in those if each.placed.walls is not None] for those in laid
+    ]
+    merged = _merged(walls, p, kept)
     lines, sure = kept.joined.get(laid, lambda: _joined(laid, merged, p))
     return JointComponent(cluster.poses, cluster.confidence, lines, sure)
 
 
 def _joined(laid: Sequence[Sequence[Laid]], merged: FloatArray, p: JointParameters) -> Joined:
     """Return the walls of all pieces, of which (n, 4) are left when `merged`."""
-    together = [each for those in laid for each in those]
-    seen = np.concatenate([np.empty((0, 4)), *(each.placed.seen for each in together)])
-    support: IntArray = np.concatenate(
-        [np.empty(0, dtype=np.int64), *(each.lines.support for each in together)]
-    )
-    free = unite([ring for each in together for ring in each.placed.free_space], p.free_space)
-    lines = _simplified(merged, seen, support, free, p)
+    together = [each.placed for those in laid for each in those]
+    if len(together) == 1 and together[0].joined is not None:
+        return together[0].seen, together[0].joined
+    seen = _seen(laid)
+    stays = staying(seen, p.simplification)
+    known, new = seen.those(stays), seen.those(~stays)
+    again = new.segments[~np.isnan(new.sure)]
+    free = unite([ring for each in together for ring in each.seen.free_space], p.free_space)
+    lines, order = _simplified(np.concatenate([merged, again]), known, new, free, p)
+    lines = replace(lines, free_space=_free_space(together, free, p))
     views = [
         [(each.witness, each.placed.pose) for each in those if each.witness is not None]
         for those in laid
     ]
-    return lines, segment_confidence(lines, views, p.segments)
+    return lines, segment_confidence(lines, views, p.segments, _voices(known, order))
+
+
+def _seen(laid: Sequence[Sequence[Laid]]) -> Seen:
+    """Return all walls as the pieces have them."""
+    together = [(view, each.placed) for view, those in enumerate(laid) for each in those]
+    counts = [len(placed.seen.segments) for _, placed in together]
+    lines = LineMap.union([placed.seen for _, placed in together])
+    sure = [
+        np.full(count, np.nan) if placed.joined is None else placed.joined
+        for count, (_, placed) in zip(counts, together, strict=True)
+    ]
+    return Seen(
+        lines.segments,
+        lines.support,
+        np.concatenate([np.empty(0), *sure]),
+        np.repeat(np.array([view for view, _ in together], dtype=np.int64), counts),
+        np.repeat(np.arange(len(together)), counts),
+    )
+
+
+def _free_space(
+    together: Sequence[Placed], free: BaseGeometry, p: JointParameters
+) -> tuple[FloatArray, ...]:
+    """Return the rings of all that is `free`: those of joint maps as they were."""
+    before = [ring for each in together if each.joined is not None for ring in each.seen.free_space]
+    if not before:
+        return rings(free)
+    beyond = rings(free.difference(from_rings(before)))
+    return (*before, *rings(unite(beyond, p.free_space)))
+
+
+def _voices(known: Seen, order: IntArray) -> Voices:
+    """Return what was said of walls before, those `known` first and then put into `order`."""
+    new = len(order) - len(known.segments)
+    view = np.concatenate([known.view, np.full(new, -1)])
+    return Voices(view[order], np.concatenate([known.share, np.ones(new)])[order])
 
 
 def _placed(piece: Piece, frame: FloatArray, p: JointParameters, kept: Kept) -> Placed:
     """Lay `piece` down in the component that is at `frame` (3,)."""
+    if piece.joined is not None:
+        pose = se2.compose(frame, piece.pose)
+        return Placed(pose, None, piece.lines.moved(pose), piece.joined)
     steps = np.round(se2.compose(frame, piece.pose) / STEPS).astype(np.int64)
     key = piece.lines, tuple(steps.tolist())
     return kept.placed.get(key, lambda: _laid_down(piece.lines, steps * STEPS, p))
@@ -166,7 +216,7 @@ def _placed(piece: Piece, frame: FloatArray, p: JointParameters, kept: Kept) -> 
 def _laid_down(lines: LineMap, pose: FloatArray, p: JointParameters) -> Placed:
     moved = lines.moved(pose)
     merged = evolve(moved.segments, lengths(moved.segments) * lines.support, p.merging)
-    return Placed(pose, Walls(merged.segments, merged.weights), moved.segments, moved.free_space)
+    return Placed(pose, Walls(merged.segments, merged.weights), moved, None)
 
 
 def _merged(walls: Sequence[Sequence[Walls]], p: JointParameters, kept: Kept) -> FloatArray:
@@ -178,12 +228,20 @@ def _merged(walls: Sequence[Sequence[Walls]], p: JointParameters, kept: Kept) ->
 
 
 def _simplified(
-    merged: FloatArray, seen: FloatArray, support: IntArray, free: BaseGeometry, p: JointParameters
-) -> LineMap:
-    """Return the fewest walls that explain (n, 4) `seen`, of those `merged`, with their support."""
-    walls = simplify(merged, seen, support, free, p.simplification)
-    wall, source = sources(walls, seen, p.simplification)
-    count = np.bincount(wall, support[source], minlength=len(walls))
+    merged: FloatArray, known: Seen, new: Seen, free: BaseGeometry, p: JointParameters
+) -> tuple[LineMap, IntArray]:
+    """Return the walls `known`, and the fewest that explain what is `new`, of those `merged`.
+
+    Returns
+    -------
+    tuple of LineMap and IntArray
+        The walls with their support, and (n,) their order, those known being the first.
+    """
+    found = simplify(merged, new.segments, new.support, free, p.simplification, known.segments)
+    walls = np.concatenate([known.segments, found])
+    wall, source = sources(walls, new.segments, p.simplification)
+    count = np.bincount(wall, new.support[source], minlength=len(walls))
+    count[: len(known.segments)] += known.support
     order, polyline = group_polylines(walls, p.max_gap)
-    known = np.maximum(count, 1).astype(np.int64)[order]
-    return LineMap(walls[order], polyline, known, rings(free))
+    support = np.maximum(count, 1).astype(np.int64)[order]
+    return LineMap(walls[order], polyline, support), order

@@ -152,7 +152,7 @@ class JointMapBuilder:
         """Join a cluster, its submaps at `poses` in their components."""
         pieces = {
             name: [
-                Piece(s.map, self._witness(s.map), pose)
+                Piece(s.map, self._witness(s.map), pose, s.joined)
                 for s, pose in zip(submaps[name], those, strict=True)
             ]
             for name, those in poses.items()

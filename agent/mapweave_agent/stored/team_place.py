@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
-from mapweave.geometry import se2
-from mapweave.maps import Alignment, RobotMap, SharedPlace, Submap, component_name
-from mapweave.reasons import Reason, ReasonKind
+from mapweave.mapping.localization.followed import on_path
+from mapweave.maps import Alignment, RobotMap, Submap, component_name
 from mapweave_agent.comparison_schedule import Comparison
 from mapweave_protocol.wire.messages import AlignmentMessage, MapVersion
 from mapweave_protocol.wire.pairs import Run, run_of
@@ -91,24 +90,8 @@ class TeamPlace:
                 run = max(found, key=lambda each: found[each].confidence, default=None)
             if run is not None:
                 self._chosen[name] = run
-                joins.setdefault(run, []).append(self._on_path(found[run], name, submap))
+                joins.setdefault(run, []).append(on_path(found[run], name, self._known, submap))
         return joins
-
-    def _on_path(self, found: Alignment, name: str, submap: Submap) -> Alignment:
-        """Return what was `found` of a wall of the stored map, held by a stretch of the path."""
-        found = replace(found, cause=Reason(ReasonKind.FOLLOWED, found=found.cause))
-        poses = {s.id: s.pose for s in self._known.submaps}
-        for place in found.places[:1]:
-            own = place.reference if name == found.reference else place.other
-            here = se2.between(poses[own], submap.pose)
-            if name == found.reference:
-                transform = se2.compose(se2.inverse(here), place.transform)
-                held = SharedPlace(submap.id, place.other, transform, place.at)
-            else:
-                transform = se2.compose(place.transform, here)
-                held = SharedPlace(place.reference, submap.id, transform, place.at)
-            return replace(found, places=(held,))
-        return found
 
 
 def path_of(robot_map: RobotMap, known: RobotMap | None) -> RobotMap:

@@ -74,10 +74,27 @@ class Witness:
         return np.asarray(four >> ((columns & 3) << 1).astype(np.uint8) & 3)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Voices:
+    """What was said of walls when they were joined before.
+
+    Attributes
+    ----------
+    view
+        (n,) of each wall the place among the views of the one that it is of; -1 of a new wall.
+    share
+        (n,) of what was said of it then that confirmed it, in [0, 1]; 1 of a new wall.
+    """
+
+    view: IntArray
+    share: FloatArray
+
+
 def segment_confidence(
     lines: LineMap,
     views: Sequence[Sequence[tuple[Witness, FloatArray]]],
     parameters: SegmentConfidenceParameters,
+    before: Voices | None = None,
 ) -> FloatArray:
     """Return (n,) in [0, 1]: more with every scan and map that saw it, less with every denial.
 
@@ -89,21 +106,29 @@ def segment_confidence(
     views
         The maps that were joined, each of one piece or more with its (3,) pose in the frame of
         `lines`. A map has one voice: where one piece has a wall and another saw through, the wall.
+    before
+        What the views that were joined before said of their own walls: that voice is divided as
+        those were that they were made of.
     """
     if len(lines.segments) == 0:
         return np.empty(0)
     oriented, owner = points_on_lines(lines, parameters.spacing)
-    confirm, deny = np.zeros(len(oriented)), np.zeros(len(oriented))
-    for pieces in filter(None, views):
+    before = before or Voices(np.full(len(lines.segments), -1), np.ones(len(lines.segments)))
+    old, share = before.view[owner], before.share[owner]
+    confirm, deny = np.where(old >= 0, share, 0.0), np.where(old >= 0, 1.0 - share, 0.0)
+    for number, pieces in enumerate(views):
+        if not pieces:
+            continue
         near = np.zeros(len(oriented), dtype=np.bool_)
         through = near.copy()
         for known, said in _heard(pieces, oriented.points):
             near[known] |= said == CONFIRMS
             through[known] |= said == DENIES
-        confirm += near
-        deny += through & ~near
+        confirm += near & (old != number)
+        deny += through & ~near & (old != number)
     # What nobody confirms at this very place was merged from walls close by: one voice for it.
-    left = np.maximum(confirm, 1) / (np.maximum(confirm, 1) + deny)
+    confirm = np.where(old >= 0, confirm, np.maximum(confirm, 1))
+    left = confirm / (confirm + deny)
     agreed = np.bincount(owner, weights=left) / np.bincount(owner)
     return np.asarray(lines.support / (lines.support + 1.0) * agreed)
 

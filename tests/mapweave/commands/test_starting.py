@@ -223,3 +223,44 @@ def test_a_map_servers_grid_becomes_a_robots_map_and_takes_no_start(tmp_path: Pa
     assert main_here("fuse", stored, output).returncode == 0
     done = main_here("map", grid, "--localize", stored)
     assert_fails_in_one_line(done, grid, "is a grid; expected a log", "--localize")
+
+
+def test_a_stored_joint_map_that_is_fused_with_an_unrelated_map_stays_as_it_was(
+    tmp_path: Path,
+) -> None:
+    c = seen("c", part(BUILDING, 0, 18), 0, tmp_path)
+    d = seen("d", part(BUILDING, 8, 30), 1, tmp_path)
+    crate = LineMap(np.array([[0.0, 0.0, 1.0, 0.0]]), np.zeros(1, np.int64), np.ones(1, np.int64))
+    u = seen("u", crate, 2, tmp_path)
+    stored, output = tmp_path / "joint.json", tmp_path / "out.json"
+    assert main_here("fuse", c, d, "--output", stored).returncode == 0
+    assert main_here("fuse", stored, u, "--output", output).returncode == 3
+    before, after = read_joint(stored).components[0], read_joint(output).components[0]
+    assert list(after.robots) == ["c/0", "d/0"] and after.confidence == before.confidence
+    np.testing.assert_allclose(after.map.segments, before.map.segments, atol=1e-3)
+    np.testing.assert_array_equal(after.map.support, before.map.support)
+    np.testing.assert_allclose(after.segment_confidence, before.segment_confidence, atol=1e-3)
+    for ring, other in zip(after.map.free_space, before.map.free_space, strict=True):
+        np.testing.assert_allclose(ring, other, atol=1e-3)
+
+
+def test_a_robot_that_only_followed_in_a_map_is_no_second_witness_of_its_walls(
+    tmp_path: Path,
+) -> None:
+    a = seen("a", part(BUILDING, 0, 18), 0, tmp_path)
+    b = seen("b", part(BUILDING, 10, 30), 2, tmp_path)
+    known = read_map(a)
+    driven = Trajectory(np.arange(3), np.arange(3.0), np.zeros((3, 3)))
+    path = Submap(1, 0, np.zeros(3), LineMap.empty(), driven)
+    located, output, mapped = (tmp_path / f"{name}.json" for name in ("loc", "out", "mapped"))
+    write_map(located, replace(known, robot="r", submaps=(*known.submaps, path)))
+    assert main_here("fuse", a, b, "--output", mapped).returncode == 0
+    done = main_here("fuse", located, b, "--output", output)
+    assert (done.returncode, "only followed" in done.stderr) == (0, True)
+    assert "accepted" in done.stdout and "follows in" in done.stdout
+    (one,), (other,) = read_joint(output).components, read_joint(mapped).components
+    once = read_map(b).submaps[0].map.support.max()
+    assert one.map.support.max() == once < other.map.support.max()
+    between = se2.between(one.robots["b/0"], one.robots["r/0"])
+    expected = se2.between(other.robots["b/0"], other.robots["a/0"])
+    np.testing.assert_allclose(between, expected, atol=0.05)

@@ -94,3 +94,23 @@ def test_a_cluster_that_is_surer_now_says_so_with_the_same_walls(
     first = joined(pieces, kept)
     surer = joining.join(replace(CLUSTER, confidence=0.95), pieces, P, kept)
     assert surer.map is first.map and surer.confidence == 0.95
+
+
+def test_walls_joined_before_stay_and_only_what_they_leave_unexplained_is_added() -> None:
+    walls = np.array([[0.0, 0, 10, 0], [10, 0, 10, 6], [3, 3, 3.5, 3]])
+    support = np.array([200, 200, 10])
+    lines = LineMap(walls, np.arange(3), support)
+    sure = np.array([0.9, 0.8, 0.5])
+    seen = np.array([[0.0, 0.02, 10, 0.02], [14, 0, 14, 6]])
+    new = LineMap(seen, np.arange(2), np.array([30, 30]))
+    old = Piece(lines, witness(lines), np.zeros(3), sure)
+    pieces = {"a/0": [old], "b/0": [Piece(new, witness(new), np.zeros(3))]}
+    alone = join(Cluster({"a/0": np.zeros(3)}, 1.0), pieces, P)
+    np.testing.assert_array_equal(alone.map.segments, walls)
+    np.testing.assert_array_equal(alone.segment_confidence, sure)
+    both = join(Cluster({"a/0": np.zeros(3), "b/0": np.zeros(3)}, 1.0), pieces, P)
+    order = [np.abs(both.map.segments - wall).max(axis=1).argmin() for wall in [*walls, seen[1]]]
+    np.testing.assert_allclose(both.map.segments[order], [*walls, seen[1]], atol=1e-9)
+    np.testing.assert_array_equal(both.map.support[order], [230, 200, 10, 30])
+    assert both.segment_confidence[order[0]] > 0.9
+    assert both.segment_confidence[order[2]] == pytest.approx(0.5)
