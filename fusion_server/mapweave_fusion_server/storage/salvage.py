@@ -74,6 +74,8 @@ def salvage(damaged: Database, path: Path, team: str) -> Path:
 
 
 def _is_readable(damaged: Database) -> bool:
+    # Else SQLite opens nothing of a file that is shorter than its first page says; only read here.
+    damaged.rows("PRAGMA writable_schema = ON")
     try:
         tables = {name for (name,) in damaged.rows("SELECT name FROM sqlite_master")}
     except DamagedError:
@@ -131,7 +133,8 @@ def _walk(damaged: Database, table: str, order: str) -> Iterator[tuple[int, tupl
             )
         except DamagedError:
             return
-        if not found:
+        # Behind a damaged page a row may come again that was there before.
+        if not found or (found[0][0] > beyond) != (order == "ASC"):
             return
         beyond = found[0][0]
         yield beyond, found[0][1:]

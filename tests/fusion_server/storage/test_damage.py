@@ -85,6 +85,18 @@ def test_a_store_whose_pages_are_damaged_is_saved_as_far_as_it_can_be_read(
         assert store.version(store.latest_version) == b"the next one"
 
 
+@pytest.mark.parametrize("share", [0.95, 0.7, 0.3])
+def test_of_a_store_that_was_cut_off_what_is_there_is_read(path: Path, share: float) -> None:
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with Store(path, "rescue") as store:
+        kept = [n for n in range(1, VERSIONS + 1) if store.version(n) is not None]
+        assert len(kept) >= (share - 0.25) * VERSIONS
+        assert all(store.version(n) == _message(n) for n in kept)
+    [aside] = path.parent.glob("store.sqlite.damaged-*")
+    assert len(aside.read_bytes()) == int(share * len(whole))
+
+
 def test_the_root_of_a_table_lost_costs_that_table(path: Path) -> None:
     damaged = bytearray(path.read_bytes())
     damaged[2 * 4096 : 3 * 4096] = bytes(4096)  # of the versions
