@@ -47,8 +47,9 @@ class Ending:
 def ended_in_order() -> Iterator[Ending]:
     """Have Ctrl-C, and the word to terminate, end in a block only what is `Ending.until`.
 
-    They may come twice: shells and `timeout` tell a process and then its group. For the main
-    thread.
+    They may come twice: shells and `timeout` tell a process and then its group. Once an end was
+    asked for, the program is about to end, and they are ignored until it has: a handler of Python's
+    is gone before its process is. For the main thread.
     """
     ending = Ending()
     before = {number: signal.signal(number, ending.note) for number in STOP_SIGNALS}
@@ -56,4 +57,4 @@ def ended_in_order() -> Iterator[Ending]:
         yield ending
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if ending.asked else handler)

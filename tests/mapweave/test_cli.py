@@ -254,7 +254,7 @@ def test_the_status_a_command_returns_is_the_programs(offer: Callable[[str], Non
     [
         ["mark", "r1", "victim", "--at", "-3.5,1"],
         ["mark", "r1", "victim", "--at=-3.5,-1"],
-        ["pin", "r1/0", "r2/0", "--transform", "-3,0.5,-90"],
+        ["pin", "r1/0", "r2/0", "--transform", "-3,0.5,-90", "--reason", "seen"],
     ],
 )
 def test_a_place_that_begins_with_a_minus_is_no_option(
