@@ -101,7 +101,8 @@ def _slab(
 ) -> tuple[FloatArray, FloatArray]:
     """Return where lines are between `low` and `high` [m] along the unit vectors `axis`."""
     position, speed = np.einsum("ij,ij->i", offset, axis), np.einsum("ij,ij->i", along, axis)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # Along a line that hardly nears the slab it is infinitely far.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         one, other = (low - position) / speed, (high - position) / speed
     still = speed == 0
     inside = (low <= position) & (position <= high)
@@ -115,7 +116,7 @@ def _disc(offset: FloatArray, along: FloatArray, radius: float) -> tuple[FloatAr
     a = np.einsum("ij,ij->i", along, along)
     b, c = np.einsum("ij,ij->i", offset, along), np.einsum("ij,ij->i", offset, offset) - radius**2
     root = np.sqrt(np.maximum(b**2 - a * c, 0.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         first, last = (-b - root) / a, (-b + root) / a
     hit = (a > 0) & (b**2 > a * c)
     return np.where(hit, first, np.inf), np.where(hit, last, -np.inf)

@@ -28,6 +28,13 @@ def test_samples_stand_for_equal_parts_that_add_up_to_the_segment() -> None:
     np.testing.assert_allclose(found.points[1], [1.5, 2])
 
 
+def test_a_segment_of_hardly_any_length_is_within_reach_or_is_not() -> None:
+    wall = np.array([[1.6e-138, 0.017, 0.0, 0.0]])
+    for x, near in ((0.0, True), (5.0, False)):
+        first, last = near_intervals(np.array([[x, 2e-173, x, 0.0]]), wall, 0.35)
+        assert (first[0] <= last[0]) == near
+
+
 def test_what_is_within_reach_of_a_wall_is_one_interval_of_a_segment() -> None:
     """As distances of many points tell; walls of no length are points."""
     random = np.random.default_rng(3)
