@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mapweave.errors import MissingExtraError
+from mapweave.errors import ArgumentError, MissingExtraError
 from mapweave.io.readers.ros_bags.laser_messages import (
     CDR,
     LASER_SCAN,
@@ -10,7 +10,7 @@ from mapweave.io.readers.ros_bags.laser_messages import (
     Message,
     UnreadableMessageError,
 )
-from mapweave.scan.scan import MIN_BEAMS, Scan
+from mapweave.scan.scan import Scan, check_beams
 from mapweave_ros.topics import DDS_LASER_SCAN
 
 MAX_BYTES = 2**20  # of a message: ten thousand beams and their intensities are a tenth of it
@@ -60,11 +60,10 @@ class ScanMessages:
             frame, scan = self._decoder.framed_scan(Message(topic, LASER_SCAN, CDR, payload), index)
         except NOISE as error:
             raise UnreadableMessageError("is no LaserScan") from error
-        if len(scan.ranges) < MIN_BEAMS:
-            raise UnreadableMessageError(
-                f"has {len(scan.ranges)} beams; expected {MIN_BEAMS} or more"
-            )
-        return frame, scan
+        try:
+            return frame, check_beams(scan)
+        except ArgumentError as error:
+            raise UnreadableMessageError(str(error)) from error
 
     def decode(self, topic: str, kind: str, payload: bytes) -> Any:  # noqa: ANN401 - made at run time
         """Return another message, of a `kind` such as ``nav_msgs/msg/Odometry``.

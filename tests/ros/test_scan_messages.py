@@ -49,7 +49,7 @@ def test_odd_stamps_are_handed_on(stamp: float) -> None:
 @pytest.mark.parametrize(
     ("payload", "why"),
     [
-        (laser_scan(np.full(9, 2.0), 0.0, TURN), "9 beams; expected 10 or more"),
+        (laser_scan(np.full(9, 2.0), 0.0, TURN), "ranges: expected 10 beams or more, got 9"),
         (laser_scan(np.full(20, 2.0), 0.0, 0.0), "angle_increment"),
         (laser_scan(np.full(20, 2.0), np.nan, TURN), "angle_min"),
         (laser_scan(np.full(20, 2.0), 0.0, np.inf), "angle_increment"),
