@@ -8,13 +8,14 @@ they stand as the first argument of ``command = Command("…", …)``.
 import argparse
 import ast
 import errno
+import json
 import math
 import os
 import re
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points, version
@@ -116,8 +117,14 @@ def add_topic_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--json``: what is said is for a program."""
+    """Add ``--json``: what is said is for a program; say it with `say`."""
     parser.add_argument("--json", action="store_true", help="say it as JSON, for a program")
+
+
+def say(options: argparse.Namespace, content: object, lines: Iterable[str]) -> None:
+    """Print `content` as a line of JSON where ``--json`` asks for it, and `lines` otherwise."""
+    for line in [json.dumps(content)] if options.json else lines:
+        print(line, flush=True)  # noqa: T201
 
 
 def config_of(options: argparse.Namespace) -> "Config":

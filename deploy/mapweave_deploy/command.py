@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from rich.console import Console
 from rich.text import Text
 
-from mapweave.cli import Command, config_of
+from mapweave.cli import Command, config_of, say
 from mapweave.config import Config
 from mapweave.errors import FileError, MapweaveError
 from mapweave.ids import check_id
@@ -36,7 +36,13 @@ from mapweave_deploy.run.launcher import (
 from mapweave_deploy.run.options import check_ports, check_source, configure
 from mapweave_deploy.run.output_folder import OutputFolder
 from mapweave_deploy.run.processes import ProcessGroup
-from mapweave_deploy.run.report import tell_files, tell_outcome, tell_verdicts
+from mapweave_deploy.run.report import (
+    Verdicts,
+    outcome_content,
+    tell_files,
+    tell_outcome,
+    tell_verdicts,
+)
 from mapweave_deploy.run.team_plan import Member, simulated_team, team_from_logs
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.address import new_token
@@ -83,7 +89,7 @@ def _run_in(
     folder: OutputFolder, recorded: list[Member], options: argparse.Namespace, config: Config
 ) -> None:
     """Run the team, of `recorded` robots unless it is simulated; write what it came to."""
-    console, made_with = Console(), MadeWith.of(config)
+    console, made_with = Console(stderr=options.json), MadeWith.of(config)
     _say(console, [_source(options)])
     # The crew stops before what it wrote to is removed.
     with (
@@ -187,9 +193,11 @@ def _tell(
     draw_joint(outcome.joint, folder.picture, outcome.maps)
     _say(console, tell_outcome(outcome, plan.members))
     files = [("picture", folder.picture), ("joint map", folder.joint), ("store", store)]
-    _say(console, tell_files([*files, ("what each process said", folder.logs)]))
-    simulated = options.world is not None
-    _say(console, tell_verdicts(outcome, plan.members, simulated=simulated))
+    files.append(("what each process said", folder.logs))
+    _say(console, tell_files(files))
+    verdicts = Verdicts.of(outcome, plan.members, simulated=options.world is not None)
+    _say(console, tell_verdicts(outcome, plan.members, verdicts))
+    say(options, outcome_content(outcome, plan.members, files, verdicts), ())
 
 
 def _source(options: argparse.Namespace) -> str:

@@ -1,11 +1,10 @@
 """``mapweave config``: the effective configuration, and where each value comes from."""
 
 import argparse
-import json
 from collections.abc import Iterator
 from itertools import groupby
 
-from mapweave.cli import Command, add_config_argument, config_of
+from mapweave.cli import Command, add_config_argument, add_json_argument, config_of, say
 from mapweave.config import Config, Setting
 
 WIDTH = 24  # columns of a setting, before what is said of it
@@ -13,13 +12,12 @@ WIDTH = 24  # columns of a setting, before what is said of it
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     add_config_argument(parser)
-    parser.add_argument("--json", action="store_true", help="as JSON, for programs")
+    add_json_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
     config = config_of(options)
-    text = json.dumps(_as_json(config), indent=2) if options.json else "\n".join(tell(config))
-    print(text)  # noqa: T201
+    say(options, _as_json(config), tell(config))
     return 0
 
 

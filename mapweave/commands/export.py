@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from mapweave.cli import Command
+from mapweave.cli import Command, add_json_argument, say
 from mapweave.commands.progress import busy
 from mapweave.io.export import EXPORT_SUFFIXES, check_export_suffix, export
 from mapweave.io.map_files import load
@@ -17,12 +17,14 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help=f"the file to write, named {', '.join(f'*{suffix}' for suffix in EXPORT_SUFFIXES)}",
     )
+    add_json_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
     check_export_suffix(options.output)
     with busy(f"writing {options.output.name}"):
         export(load(options.map), options.output)
+    say(options, {"output": str(options.output), "bytes": options.output.stat().st_size}, [])
     return 0
 
 

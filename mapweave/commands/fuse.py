@@ -1,14 +1,13 @@
 """``mapweave fuse``: robots' maps to a joint map."""
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from itertools import combinations, product
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
-from mapweave.cli import Command, add_config_argument, add_json_argument, config_of
+from mapweave.cli import Command, add_config_argument, add_json_argument, config_of, say
 from mapweave.commands.progress import busy, track
 from mapweave.commands.stored_joint import as_robot_maps, robots_of, with_members
 from mapweave.config import Config
@@ -56,8 +55,7 @@ def _run(options: argparse.Namespace) -> int:
         save(joint, options.output)
     if options.plot:
         plot(joint, options.plot, {m.robot: m for m in given if isinstance(m, RobotMap)})
-    for line in [json.dumps(_content(joint))] if options.json else tell(joint):
-        print(line)  # noqa: T201
+    say(options, _content(joint), tell(joint))
     if not (options.output or options.plot or options.json):
         print("The joint map is not kept: --output JOINT.json keeps it.")  # noqa: T201
     robots = set().union(*(_robots(some) for some in given))

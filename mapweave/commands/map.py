@@ -1,7 +1,6 @@
 """``mapweave map``: a laser log to a robot's map."""
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -16,6 +15,7 @@ from mapweave.cli import (
     add_topic_argument,
     argument,
     config_of,
+    say,
 )
 from mapweave.commands.ending import Ending, ended_in_order
 from mapweave.commands.garbage import spared
@@ -135,7 +135,7 @@ def _run_grid(options: argparse.Namespace, config: Config) -> int:
 
 
 def _tell(options: argparse.Namespace, figures: Mapping[str, float], sentence: str) -> None:
-    print(json.dumps(figures) if options.json else sentence)  # noqa: T201
+    say(options, dict(figures), [sentence])
     if not (options.output or options.plot or options.json):
         print("The map is not kept: --output MAP.json keeps it.")  # noqa: T201
 

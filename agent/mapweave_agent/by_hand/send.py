@@ -7,12 +7,12 @@ from pathlib import Path
 
 import zenoh
 
-from mapweave.cli import Command, add_config_argument, config_of
+from mapweave.cli import Command, add_config_argument, add_json_argument, config_of, say
 from mapweave.commands.progress import track
 from mapweave.errors import FileError
 from mapweave.fusion.align import FusionParameters, align
 from mapweave.ids import check_id, is_id
-from mapweave.io.map_files import read_map
+from mapweave.io.map_files import alignment_content, read_map
 from mapweave.maps import Alignment, RobotMap, component_name
 from mapweave.text import percent
 from mapweave_agent.by_hand.delivery import Delivery
@@ -37,6 +37,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         "--robot", metavar="ID", help="as whose run it is delivered (default as the map says)"
     )
     add_connection_arguments(parser)
+    add_json_argument(parser)
     add_config_argument(parser)
 
 
@@ -55,13 +56,15 @@ def _run(options: argparse.Namespace) -> int:
         own = numbered(replace(robot_map, robot=robot, boot=boot), runs)
         with Delivery(session, team, own) as delivery:
             delivery.map()
-            print(f"delivered: {_named(own)}, run {boot}")  # noqa: T201
+            names = [component_name(own.robot, component) for component in own.components]
+            content = {"delivered": names, "boot": boot}
+            say(options, content, [f"delivered: {', '.join(names)}, run {boot}"])
             others = [run for run in runs if (run.robot, run.boot) != (robot, boot)]
             for run in track(others, "comparing", len(others)):
                 message = _compared(session, team, own, run, parameters)
                 if message is not None:
                     delivery.alignments(message)
-                    _tell(message.unpack())
+                    _tell(options, message.unpack())
     return 0
 
 
@@ -99,14 +102,11 @@ def _compared(
     return AlignmentMessage.pack(own.robot, MapVersion.of(pair[0]), MapVersion.of(pair[1]), found)
 
 
-def _tell(found: tuple[Alignment, ...]) -> None:
+def _tell(options: argparse.Namespace, found: tuple[Alignment, ...]) -> None:
     for a in found:
         sure = percent(a.confidence)
-        print(f"{a.reference} - {a.other}: {a.decision} ({sure}): {a.reason}")  # noqa: T201
-
-
-def _named(own: RobotMap) -> str:
-    return ", ".join(component_name(own.robot, component) for component in own.components)
+        sentence = f"{a.reference} - {a.other}: {a.decision} ({sure}): {a.reason}"
+        say(options, alignment_content(a), [sentence])
 
 
 command = Command(

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from mapweave.cli import Command, argument, whole
+from mapweave.cli import Command, add_json_argument, argument, say, whole
 from mapweave.errors import MissingExtraError
 from mapweave_protocol.link.security.roster import Roster
 
@@ -42,6 +42,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"how long the certificates are valid (default {DEFAULT_DAYS})",
     )
+    add_json_argument(parser)
     parser.add_argument(
         "--output", type=Path, metavar="DIR", help="where to write (default keys-TEAM)"
     )
@@ -53,7 +54,8 @@ def _run(options: argparse.Namespace) -> int:
     )
     folder = options.output or Path(f"keys-{roster.team}")
     made = list(_made(roster, folder, options))
-    print(f"{folder}: keys for {', '.join(made) if made else 'nobody new'}")  # noqa: T201
+    content = {"folder": str(folder), "made": made}
+    say(options, content, [f"{folder}: keys for {', '.join(made) if made else 'nobody new'}"])
     return 0
 
 

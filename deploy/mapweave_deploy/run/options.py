@@ -5,7 +5,7 @@ import re
 import socket
 from pathlib import Path
 
-from mapweave.cli import add_config_argument, argument, positive
+from mapweave.cli import add_config_argument, add_json_argument, argument, positive
 from mapweave.errors import ArgumentError
 from mapweave_agent.source import parse_rate
 from mapweave_deploy.sim.lidars import LIDARS
@@ -145,6 +145,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_output(parser: argparse.ArgumentParser) -> None:
+    add_json_argument(parser)
     parser.add_argument(
         "--output",
         type=Path,

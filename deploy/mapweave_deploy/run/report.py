@@ -1,11 +1,14 @@
-"""What a team came to, in words."""
+"""What a team came to, in words and as values."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
+from mapweave.io.map_files import alignment_content
 from mapweave.maps import Alignment, JointComponent, RobotMap
 from mapweave.text import counted, percent
 from mapweave_deploy.run.evaluation import (
@@ -91,21 +94,92 @@ def _tell_component(component: JointComponent) -> str:
     return f"{names}, confidence {percent(component.confidence)}, {segments}"
 
 
+@dataclass(frozen=True, slots=True)
+class Verdicts:
+    """Whether what was joined is right.
+
+    Attributes
+    ----------
+    pairs
+        Of the pairs of robots that were joined.
+    limits
+        How far from the truth is right still.
+    truth
+        What that is, in words.
+    """
+
+    pairs: list[PairEvaluation]
+    limits: Limits
+    truth: str
+
+    @classmethod
+    def of(cls, outcome: TeamOutcome, members: Sequence[Member], *, simulated: bool) -> Self:
+        """Judge by the truth of a simulated world, or by the poses in logs."""
+        limits = WORLD_LIMITS if simulated else LOG_LIMITS
+        pairs = list(judge(outcome.joint, outcome.maps, members, limits))
+        return cls(pairs, limits, SIMULATED if simulated else LOGGED)
+
+
 def tell_verdicts(
-    outcome: TeamOutcome, members: Sequence[Member], *, simulated: bool
+    outcome: TeamOutcome, members: Sequence[Member], verdicts: Verdicts
 ) -> Iterator[str]:
     """Yield how many components there are, and whether what was joined is right."""
-    limits = WORLD_LIMITS if simulated else LOG_LIMITS
-    verdicts = list(judge(outcome.joint, outcome.maps, members, limits))
-    yield from _tell_components(outcome, members, verdicts)
-    for verdict in verdicts:
-        yield f"  {verdict.reference} and {verdict.other}: {_tell_error(verdict)}"
-    judged = [verdict.right for verdict in verdicts if verdict.right is not None]
+    yield from _tell_components(outcome, members, verdicts.pairs)
+    for pair in verdicts.pairs:
+        yield f"  {pair.reference} and {pair.other}: {_tell_error(pair)}"
+    judged = [pair.right for pair in verdicts.pairs if pair.right is not None]
     if judged:
+        limits = verdicts.limits
         yield (
             f"{sum(judged)} of {len(judged)} joined pairs are right within {limits.distance:g} m"
-            f" and {np.degrees(limits.angle):g}° of {SIMULATED if simulated else LOGGED}."
+            f" and {np.degrees(limits.angle):g}° of {verdicts.truth}."
         )
+
+
+def outcome_content(
+    outcome: TeamOutcome,
+    members: Sequence[Member],
+    files: Sequence[tuple[str, Path]],
+    verdicts: Verdicts,
+) -> dict[str, object]:
+    """Return what is told of a team, as values."""
+    return {
+        "robots": {member.robot: _robot_content(outcome, member.robot) for member in members},
+        "version": outcome.joint.version,
+        "components": [
+            {
+                "robots": sorted(component.robots),
+                "confidence": component.confidence,
+                "segments": len(component.map.segments),
+            }
+            for component in outcome.joint.components
+        ],
+        "alignments": [alignment_content(alignment) for alignment in outcome.joint.alignments],
+        "judged": [_pair_content(pair) for pair in verdicts.pairs],
+        "files": {kind: str(path) for kind, path in files},
+    }
+
+
+def _robot_content(outcome: TeamOutcome, robot: str) -> dict[str, object]:
+    status = outcome.recorder.statuses.get(robot)
+    sent = outcome.recorder.sent(robot)
+    return {
+        "scans": None if status is None else status.scans_seen,
+        "placed": None if status is None else status.scans_placed,
+        "lost": robot in outcome.lost,
+        "bytes": {kind: count.size for kind, count in sent.items()},
+    }
+
+
+def _pair_content(pair: PairEvaluation) -> dict[str, object]:
+    known = pair.right is not None
+    return {
+        "reference": pair.reference,
+        "other": pair.other,
+        "right": None if pair.right is None else bool(pair.right),
+        "distance_m": float(pair.distance) if known else None,
+        "angle_deg": float(np.degrees(pair.angle)) if known else None,
+    }
 
 
 def _tell_components(

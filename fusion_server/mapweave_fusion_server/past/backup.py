@@ -4,20 +4,23 @@ import argparse
 from pathlib import Path
 
 from mapweave.atomic import check_outputs
-from mapweave.cli import Command
+from mapweave.cli import Command, add_json_argument, say
 from mapweave_fusion_server.past.arguments import add_store_arguments, store_of
 
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("copy", type=Path, metavar="FILE", help="the copy")
     add_store_arguments(parser)
+    add_json_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
     with store_of(options) as view:
         check_outputs([options.copy], [view.path])
         view.backup(options.copy)
-        print(f"versions {view.numbers[0]} to {view.numbers[1]}, in {options.copy}")  # noqa: T201
+        first, last = view.numbers
+        content = {"versions": [first, last], "copy": str(options.copy)}
+        say(options, content, [f"versions {first} to {last}, in {options.copy}"])
     return 0
 
 

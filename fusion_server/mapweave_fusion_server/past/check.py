@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Iterator
 
-from mapweave.cli import EXIT_FAILED, Command
+from mapweave.cli import EXIT_FAILED, Command, add_json_argument, say
 from mapweave_fusion_server.past.arguments import add_store_arguments, store_of
 from mapweave_fusion_server.storage.view import StoreView
 from mapweave_protocol.errors import MessageError
@@ -28,18 +28,17 @@ KINDS: dict[str, type[Message]] = {
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     add_store_arguments(parser)
+    add_json_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
     with store_of(options) as view:
         problems = [*view.problems()] or [*_unreadable(view)]
-        for problem in problems:
-            print(f"{view.path}: {problem}")  # noqa: T201
         first, last = view.numbers
-    if problems:
-        return EXIT_FAILED
-    print(f"{view.path}: whole, versions {first} to {last}")  # noqa: T201
-    return 0
+    content = {"store": str(view.path), "versions": [first, last], "problems": problems}
+    told = problems or [f"whole, versions {first} to {last}"]
+    say(options, content, [f"{view.path}: {line}" for line in told])
+    return EXIT_FAILED if problems else 0
 
 
 def _unreadable(view: StoreView) -> Iterator[str]:

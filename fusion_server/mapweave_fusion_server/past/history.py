@@ -1,10 +1,8 @@
 """``mapweave history``: the versions that a store has."""
 
 import argparse
-import json
-from collections.abc import Iterator
 
-from mapweave.cli import Command, argument, whole
+from mapweave.cli import Command, add_json_argument, argument, say, whole
 from mapweave.errors import FileError
 from mapweave_fusion_server.past.arguments import (
     add_store_arguments,
@@ -27,27 +25,25 @@ def _configure(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"how many, of the last ones (default {DEFAULT_LIMIT})",
     )
-    parser.add_argument("--json", action="store_true", help="one line of JSON for each version")
+    add_json_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
     with store_of(options) as view:
         for row in view.versions(options.limit):
-            for line in _lines(view, row, as_json=options.json):
-                print(line)  # noqa: T201
+            _tell(options, view, row)
     return 0
 
 
-def _lines(view: StoreView, row: VersionEntry, *, as_json: bool) -> Iterator[str]:
+def _tell(options: argparse.Namespace, view: StoreView, row: VersionEntry) -> None:
     try:
         told, groups = _told(view, row.number)
     except FileError as error:
         told, groups = error.problem, None
-    if as_json:
-        fields = {"version": row.number, "created": row.created, "bytes": row.size}
-        yield json.dumps(fields | ({"damaged": told} if groups is None else {"components": groups}))
-    else:
-        yield f"{row.number:>6}  {tell_time(row.created)}  {row.size:>9} bytes  {told}"
+    fields: dict[str, object] = {"damaged": told} if groups is None else {"components": groups}
+    fields |= {"version": row.number, "created": row.created, "bytes": row.size}
+    line = f"{row.number:>6}  {tell_time(row.created)}  {row.size:>9} bytes  {told}"
+    say(options, fields, [line])
 
 
 def _told(view: StoreView, number: int) -> tuple[str, list[list[str]]]:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from mapweave.cli import EXIT_FAILED, Command, argument, positive
+from mapweave.cli import EXIT_FAILED, Command, add_json_argument, argument, positive
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.asking import request_statuses
 from mapweave_protocol.link.guard.refusals import Refusals
@@ -171,7 +171,7 @@ def _robot_rows(team: Team) -> Iterator[tuple[str, ...]]:
             robot,
             here,
             status.state,
-            f"{status.scans_seen}, {status.scans_skipped} skipped",
+            f"{status.scans_placed} of {status.scans_seen} placed, {status.scans_skipped} skipped",
             str(status.map_version),
             "" if behind is None else str(behind),
             str(len(status.holds)),
@@ -199,7 +199,7 @@ def _as_json(team: Team) -> str:
 def _configure(parser: argparse.ArgumentParser) -> None:
     parser.description = f"{command.summary} {MEANING}"
     add_connection_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="one line of JSON for programs")
+    add_json_argument(parser)
     parser.add_argument(
         "--patience",
         type=argument(positive),

@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from mapweave.cli import Command
+from mapweave.cli import Command, add_json_argument, say
 from mapweave.text import shown
 from mapweave_protocol.errors import MessageError
 from mapweave_protocol.link.arguments import DEFAULT_TEAM, add_connection_arguments, connection_of
@@ -256,9 +256,9 @@ def _run_live(console: Console, watcher: Watcher, story: Iterator[str | None]) -
             live.update(_show(watcher.story, lines), refresh=True)
 
 
-def _run_plain(console: Console, story: Iterator[str | None]) -> None:
+def _run_plain(options: argparse.Namespace, story: Iterator[str | None]) -> None:
     for line in filter(None, story):
-        console.print(Text(_stamped(line)), soft_wrap=True)
+        say(options, {"time": time.time(), "line": line}, [_stamped(line)])
 
 
 def _stamped(line: str) -> str:
@@ -267,6 +267,7 @@ def _stamped(line: str) -> str:
 
 def _configure(parser: argparse.ArgumentParser) -> None:
     add_connection_arguments(parser)
+    add_json_argument(parser)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -281,10 +282,10 @@ def _run(options: argparse.Namespace) -> int:
         lambda reason: waiting.print(f"waiting for a router: {escape(shown(reason, 300))}"),
         link,
     )
-    if console.is_terminal:
+    if console.is_terminal and not options.json:
         _run_live(console, watcher, story)
     else:
-        _run_plain(console, story)
+        _run_plain(options, story)
     return 0
 
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 import zenoh
 
+from mapweave.cli import add_json_argument
 from mapweave.errors import MapweaveError
 from mapweave.geometry.arrays import FloatArray
 from mapweave.ids import check_id
@@ -26,7 +27,7 @@ _NUMBER = r"[-+]?[0-9]{1,9}(?:\.[0-9]{0,9})?"
 
 
 def add_order_arguments(parser: argparse.ArgumentParser, taken_back: str) -> None:
-    """Add ``--as``, ``--undo`` and those of the connection.
+    """Add ``--as``, ``--json``, ``--undo`` and those of the connection.
 
     Parameters
     ----------
@@ -39,6 +40,7 @@ def add_order_arguments(parser: argparse.ArgumentParser, taken_back: str) -> Non
         metavar="NAME",
         help=f"who orders it (default ${NAME_VARIABLE}, whose keys they are, or the login name)",
     )
+    add_json_argument(parser)
     parser.add_argument("--undo", action="store_true", help=f"take back {taken_back}")
     add_connection_arguments(parser)
 

@@ -15,6 +15,7 @@ from mapweave_protocol.operator.arguments import (
     connected,
 )
 from mapweave_protocol.operator.delivery import OrderError, deliver, orders_of, runs_of, whose_maps
+from mapweave_protocol.operator.told import tell
 from mapweave_protocol.wire.messages import OrderMessage
 from mapweave_protocol.wire.orders.order_message import in_force, new_order_id, taking_back
 
@@ -52,7 +53,7 @@ def _run(options: argparse.Namespace) -> int:
         deliver(session, team, orders)
     for order in orders:
         done = "taken back" if options.undo else f"forgotten: {', '.join(boots)}"
-        print(f"{robot}: {done}, order {order.takes_back or order.id}")  # noqa: T201
+        tell(options, order, f"{robot}: {done}", robot=robot, boots=boots)
     return 0
 
 

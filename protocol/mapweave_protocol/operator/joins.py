@@ -26,6 +26,7 @@ from mapweave_protocol.operator.delivery import (
     orders_of,
 )
 from mapweave_protocol.operator.making import order_between
+from mapweave_protocol.operator.told import tell
 from mapweave_protocol.wire.messages import OrderMessage
 from mapweave_protocol.wire.orders.order_message import in_force, taking_back
 
@@ -64,7 +65,7 @@ def _run(options: argparse.Namespace, kind: OrderKind) -> int:
         deliver(session, team, orders)
     for order in orders:
         done = "taken back" if options.undo else _DONE[kind]
-        print(f"{' and '.join(pair)}: {done}, order {order.takes_back or order.id}")  # noqa: T201
+        tell(options, order, f"{' and '.join(pair)}: {done}", components=pair)
     return 0
 
 

@@ -17,6 +17,7 @@ from mapweave_protocol.operator.arguments import (
 )
 from mapweave_protocol.operator.delivery import OrderError, deliver, maps_of, orders_of
 from mapweave_protocol.operator.making import mark_at, mark_at_scan
+from mapweave_protocol.operator.told import tell
 from mapweave_protocol.wire.messages import OrderMessage
 from mapweave_protocol.wire.orders.order_message import in_force, taking_back
 
@@ -49,8 +50,9 @@ def _run(options: argparse.Namespace) -> int:
             orders = [_made(robot_map, options, name)]
         deliver(session, team, orders)
     for order in orders:
-        done = "taken back" if options.undo else f"marked on {order.ends[0].component}"
-        print(f"{options.label}: {done}, order {order.takes_back or order.id}")  # noqa: T201
+        on = options.robot if options.undo else order.ends[0].component
+        done = "taken back" if options.undo else f"marked on {on}"
+        tell(options, order, f"{options.label}: {done}", on=on, label=options.label)
     return 0
 
 

@@ -28,6 +28,7 @@ class Run:
 
     folder: Path
     said: str
+    as_json: str = ""
 
 
 def run_team(folder: Path, *arguments: str) -> Run:
@@ -39,7 +40,9 @@ def run_team(folder: Path, *arguments: str) -> Run:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return Run(folder, done.stdout)
+    return (
+        Run(folder, done.stderr, done.stdout) if "--json" in arguments else Run(folder, done.stdout)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +54,7 @@ def arena(tmp_path_factory: pytest.TempPathFactory) -> Run:
     keys = folder / "keys"
     list(make_keys(Roster("team", ("r1", "r2")), keys, datetime.now(UTC), 1, []))
     given = ["--config", str(config), "--tls", str(keys)]
-    return run_team(folder, "--world", "arena", "--robots", "2", *given)
+    return run_team(folder, "--world", "arena", "--robots", "2", *given, "--json")
 
 
 def test_the_robots_end_in_one_component_rightly(arena: Run) -> None:
@@ -96,6 +99,18 @@ def test_the_joint_map_written_says_what_it_was_made_with(arena: Run) -> None:
     made_with = read_joint(arena.folder / "joint.json").made_with
     assert made_with is not None
     assert made_with.config == Config(mapping=Mapping(patience=6)).values()
+
+
+def test_a_program_gets_what_came_of_it_in_one_line_of_json(arena: Run) -> None:
+    content = json.loads(arena.as_json)
+    joint = read_joint(arena.folder / "joint.json")
+    assert content["version"] == joint.version
+    assert [c["robots"] for c in content["components"]] == [["r1/0", "r2/0"]]
+    [judged] = content["judged"]
+    assert judged["right"] is True
+    assert judged["distance_m"] < 0.3
+    assert all(robot["placed"] > 0 and not robot["lost"] for robot in content["robots"].values())
+    assert all(Path(path).exists() for path in content["files"].values())
 
 
 def test_of_the_versions_those_were_told_that_changed_who_is_together(arena: Run) -> None:

@@ -11,7 +11,7 @@ from mapweave.io.map_files import read_joint
 from mapweave.maps import JointComponent, JointMap, LineMap, RobotMap, Submap, Trajectory
 from mapweave_deploy.run.launcher import TeamOutcome
 from mapweave_deploy.run.recorder import Recorder
-from mapweave_deploy.run.report import tell_verdicts
+from mapweave_deploy.run.report import Verdicts, tell_verdicts
 from mapweave_deploy.run.team_plan import Member
 from mapweave_deploy.sim.simulation import RobotLog, simulate
 from tests.deploy.run.test_team import run_team
@@ -86,7 +86,7 @@ def verdict(groups: list[str], places: tuple[str, str]) -> list[str]:
     maps = {"a": robot_map("a", 7, 2), "b": robot_map("b", 7)}
     members = [member("a", places[0]), member("b", places[1])]
     outcome = TeamOutcome(JointMap(1, components, ()), maps, Recorder())
-    return list(tell_verdicts(outcome, members, simulated=False))
+    return list(tell_verdicts(outcome, members, Verdicts.of(outcome, members, simulated=False)))
 
 
 def test_a_join_across_logs_is_named_and_called_neither_right_nor_wrong() -> None:

@@ -145,7 +145,13 @@ def test_what_is_forbidden_comes_apart_and_stays_apart_until_it_is_taken_back(
             joint = watcher.next()
         assert network.groups(joint) == [["a/0"], ["b/0"]]
     server.wait_for_log("anna forbids a/0 and b/0: two floors")
-    anna.orders("forbid", "a/0", "b/0", "--undo", "--reason", "one floor after all")
+    said = anna.orders(
+        "forbid", "a/0", "b/0", "--undo", "--reason", "one floor after all", "--json"
+    )
+    taken_back = json.loads(said)
+    assert taken_back["order"] == joint.orders[0].id
+    assert (taken_back["kind"], taken_back["taken_back"]) == ("forbid", True)
+    assert taken_back["components"] == ["a/0", "b/0"]
     while joint.orders:
         joint = watcher.next()
     assert network.groups(joint) == [["a/0", "b/0"]]

@@ -91,6 +91,25 @@ def test_show_tells_a_version_and_writes_it(run: Run, tmp_path: Path) -> None:
     assert run("show", "latest")[0].startswith("version 3: a/0 + b/0")
 
 
+def test_what_is_told_of_a_store_is_there_for_programs(run: Run, path: Path) -> None:
+    def told(*words: str) -> dict[str, object]:
+        [line] = run(*words, "--json")
+        content = json.loads(line)
+        assert isinstance(content, dict)
+        return content
+
+    shown = told("show", "2")
+    assert (shown["version"], shown["components"]) == (2, [["a/0"], ["b/0"]])
+    assert [a["decision"] for a in shown["alignments"]] == ["refused"]  # type: ignore[attr-defined]
+    changed = told("diff", "2", "3")
+    assert changed["new"] == ["c/0"]
+    assert changed["judged"] == [["a/0", "b/0", "refused", "accepted"]]
+    assert changed["wall"] == [8.0, 16.0]
+    assert told("check") == {"store": str(path), "versions": [1, 3], "problems": []}
+    copy = str(path.with_name("copy.sqlite"))
+    assert told("backup", copy) == {"versions": [1, 3], "copy": copy}
+
+
 @pytest.mark.parametrize("words", [["show", "latest"], ["history"], ["diff", "1", "2"], ["check"]])
 def test_the_store_of_another_team_is_not_taken_for_that_of_the_team(
     run: Run, path: Path, words: list[str]

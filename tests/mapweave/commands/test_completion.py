@@ -14,6 +14,7 @@ from mapweave.errors import MissingExtraError
 from tests.mapweave.commands.test_commands import main_here, mapweave
 
 COMMANDS = {point.name: point for point in entry_points(group=COMMAND_GROUP)}
+SERVING = {"router", "server", "agent", "bridge", "completion"}  # they log, or make a script
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +72,11 @@ def test_without_shtab_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> No
     command: Command = COMMANDS["completion"].load()
     with pytest.raises(MissingExtraError, match=r"mapweave\[completion\]"):
         command.run(argparse.Namespace(shell="bash"))
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS.keys() - SERVING))
+def test_what_a_command_tells_can_be_had_as_json(name: str) -> None:
+    assert "--json" in parser_of(name, COMMANDS[name].load()).format_usage()
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))

@@ -1,9 +1,12 @@
 """The story of a team: what is told, and the command that tells it."""
 
+import json
 import re
 import signal
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -35,6 +38,7 @@ from mapweave_protocol.wire.messages import (
 
 MakeMap = Callable[..., RobotMap]
 MakeJoint = Callable[..., JointMap]
+PATIENCE = 60.0  # [s] for a machine with much else to do
 MAPWEAVE = Path(sys.executable).with_name("mapweave")
 
 
@@ -166,10 +170,15 @@ def test_what_is_no_message_is_not_told() -> None:
         assert list(watcher.tell(Arrival(key, b"junk"))) == []
 
 
+@pytest.mark.parametrize("form", [(), ("--json",)])
 def test_the_command_tells_what_happens_line_by_line(
-    endpoint: str, team: str, random_map: MakeMap, random_joint: MakeJoint
+    endpoint: str,
+    team: str,
+    random_map: MakeMap,
+    random_joint: MakeJoint,
+    form: tuple[str, ...],
 ) -> None:
-    command = [str(MAPWEAVE), "watch", "--team", team, "--connect", endpoint]
+    command = [str(MAPWEAVE), "watch", "--team", team, "--connect", endpoint, *form]
     with (
         open_session([endpoint], patience=20.0) as session,
         declare_map_publisher(session, keys.MAP.build(team=team, robot="a")) as maps,
@@ -183,12 +192,19 @@ def test_the_command_tells_what_happens_line_by_line(
         joints.put(encode(JointMapMessage.pack(joint, "s1")))
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watching:
             assert watching.stdout is not None
+            never = threading.Timer(PATIENCE, watching.kill)
+            never.start()
             lines = [watching.stdout.readline() for _ in range(3)]
+            never.cancel()
             watching.send_signal(signal.SIGTERM)
-    assert all(re.match(r"\d\d:\d\d:\d\d ", line) for line in lines)
-    assert [line.split()[1] for line in lines] == ["before:"] * 3
-    words = sorted(line.split()[2:4] for line in lines)
-    assert words == [["a", "is"], ["a:", "2"], ["joint", "map"]]
+    if form:
+        told = [json.loads(line)["line"] for line in lines]
+        assert all(0 <= time.time() - json.loads(line)["time"] < 2 * PATIENCE for line in lines)
+    else:
+        assert all(re.match(r"\d\d:\d\d:\d\d ", line) for line in lines)
+        told = [line.partition(" ")[2] for line in lines]
+    words = sorted(line.split()[:3] for line in told)
+    assert words == [["before:", "a", "is"], ["before:", "a:", "2"], ["before:", "joint", "map"]]
 
 
 def test_an_answer_that_is_no_joint_map_is_ignored(
