@@ -30,14 +30,16 @@ def _quoted(name: object) -> str:
     return repr(name[:64] + "…" if isinstance(name, str) and len(name) > 64 else name)
 
 
+ID_IN_WORDS = (
+    "1 to 32 characters, lower-case letters, digits, '_' or '-', the first a letter or digit"
+)
+
+
 class InvalidIdError(MapweaveError):
     """A robot or team name that is not ``[a-z0-9][a-z0-9_-]{0,31}``."""
 
     def __init__(self, kind: str, name: str) -> None:
-        super().__init__(
-            f"{kind} {_quoted(name)}: expected 1 to 32 characters, lower-case letters, digits, '_'"
-            " or '-', the first a letter or digit"
-        )
+        super().__init__(f"{kind} {_quoted(name)}: expected {ID_IN_WORDS}")
         self.kind = kind
         self.name = name
 

@@ -24,7 +24,7 @@ from mapweave.commands.starting import Start, add_start_arguments
 from mapweave.config import Config
 from mapweave.errors import FileError, MapweaveError
 from mapweave.ids import check_id
-from mapweave.io.grids.map_server import is_grid, read_grid
+from mapweave.io.grids.map_server import check_no_picture, is_grid, read_grid
 from mapweave.io.map_files import save
 from mapweave.io.readers.options import OdometryChoice, ReadOptions
 from mapweave.io.scan_range import ScanRange
@@ -35,6 +35,7 @@ from mapweave.mapping.mapper import Mapper
 from mapweave.mapping.scan_mapper import ScanMapper
 from mapweave.maps import RobotMap
 from mapweave.pictures.picture import check_picture, plot
+from mapweave.scan.scan import MIN_BEAMS
 from mapweave.text import counted
 
 ROBOT = "r1"
@@ -46,6 +47,7 @@ class _Mapped:
 
     map: RobotMap
     scans: int
+    beams: int  # of that scan which has the most
     failure: MapweaveError | None
 
 
@@ -94,6 +96,7 @@ def _run(options: argparse.Namespace) -> int:
     stored = [path for path in (options.continued, options.localize) if path is not None]
     check_outputs([options.output, options.plot], [*inputs, *stored])
     start = Start.of(options)
+    check_no_picture(Path(options.log))
     if is_grid(Path(options.log)):
         return _run_grid(options, config)
     source = open_source(options.log, _read_options(options, config))
@@ -161,7 +164,7 @@ def _map_all(
     options: argparse.Namespace, source: ScanSource, mapper: ScanMapper, ending: Ending | None
 ) -> _Mapped:
     """Map the chosen scans, as far as they can be read."""
-    taken = 0
+    taken = beams = 0
     failure: MapweaveError | None = None
     chosen = options.scans.of(source.scans())
     if ending is not None:
@@ -170,12 +173,12 @@ def _map_all(
         try:
             for scan in track(chosen, f"mapping {Path(options.log).name}", _total(options, source)):
                 mapper.add(scan)
-                taken += 1
+                taken, beams = taken + 1, max(beams, len(scan.ranges))
         except MapweaveError as error:
             failure = error
         if ending is not None and ending.asked:
             _warn(_what_is_kept(options))
-        return _Mapped(mapper.finish(), taken, failure)
+        return _Mapped(mapper.finish(), taken, beams, failure)
 
 
 def _total(options: argparse.Namespace, source: ScanSource) -> int | None:
@@ -212,10 +215,11 @@ def _check_placed(
             f"none of its {mapped.scans} chosen scans can be found in {options.localize}; expected"
             " some metres of a drive in a place that it shows",
         )
+    wanted = "scans whose returns are dense enough to show walls"
+    if mapped.beams < MIN_BEAMS:
+        wanted = f"{MIN_BEAMS} beams or more, got {mapped.beams}"
     raise FileError(
-        _name(options),
-        f"none of its {mapped.scans} chosen scans can be mapped; expected scans whose"
-        " returns are dense enough to show walls",
+        _name(options), f"none of its {mapped.scans} chosen scans can be mapped; expected {wanted}"
     )
 
 

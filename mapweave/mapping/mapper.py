@@ -273,7 +273,7 @@ class Mapper:
         seen = self._waiting.popleft()
         placed = self._place(seen)
         if placed:
-            self._deskewer.placed(seen.scan.stamp, self._tracker.pose)
+            self._deskewer.placed(seen.scan, self._tracker.pose)
         self._loss.note(seen, self._tracker, placed=placed)
         if not self._loss.is_certain(len(self._tracker.missed), self._patience(seen)):
             return placed, False

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 SUFFIXES = (".yaml", ".yml")
+PICTURES = (".pgm", ".png")
 BAG_METADATA = "metadata.yaml"
 MOST_CELLS = 80_000_000
 UNKNOWN_SHADE = 205  # as map savers write it
@@ -57,6 +58,15 @@ class _Settings(BaseModel):
 def is_grid(path: Path) -> bool:
     """Whether `path` is called as such settings are; a bag's metadata is none."""
     return path.suffix.lower() in SUFFIXES and path.name != BAG_METADATA
+
+
+def check_no_picture(path: Path) -> None:
+    """Raise FileError if `path` is the picture of such a grid, and not its settings."""
+    if path.suffix.lower() not in PICTURES:
+        return
+    beside = [path.with_suffix(suffix) for suffix in SUFFIXES]
+    there = next((str(settings) for settings in beside if settings.exists()), "its .yaml")
+    raise FileError(path, f"is the picture of a grid; expected {there}, which says how to read it")
 
 
 def read_grid(path: Path) -> GridCells:

@@ -12,7 +12,6 @@ from mapweave.io.readers.lines import Line, split_lines
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.parser import ForeignLineError, LogParser
 from mapweave.io.readers.records import LaserRecord
-from mapweave.io.readers.stamps import Stamps
 from mapweave.io.readers.streams import UnusableArchiveError, read_blocks
 from mapweave.io.readers.tally import Tally
 from mapweave.scan.scan import Scan
@@ -25,7 +24,7 @@ EXPECTED = (
 
 def read(path: Path, options: ReadOptions) -> Iterator[Scan]:
     """Yield the whole scans of the log at `path`, as `read_scans` does."""
-    parser, tally, stamps = LogParser(options.angular_step), Tally("line", EXPECTED), Stamps()
+    parser, tally = LogParser(options.angular_step), Tally("line", EXPECTED)
     try:
         for line in read_lines(path):
             tally.pieces += 1
@@ -39,12 +38,10 @@ def read(path: Path, options: ReadOptions) -> Iterator[Scan]:
                 scan = _scan(tally.scans, record, options.odometry)
                 tally.add_scan(scan)
                 tally.assume(record.assumed)
-                stamps.add(record.stamp)
                 yield scan
         if problem := tally.problem():
             raise FileError(path, problem)
     finally:  # also where nobody wants the rest
-        tally.assume(stamps.assumed)
         tally.warn(path, options)
 
 

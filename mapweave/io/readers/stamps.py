@@ -2,6 +2,8 @@
 
 import math
 
+from mapweave.scan.clock import SHORTEST
+
 _FEW = 10
 """Scans whose stamps need not tell time: so few may be taken at once."""
 
@@ -14,6 +16,7 @@ class Stamps:
         self._onwards = 0
         self._back = 0
         self._last = math.nan
+        self._first = math.nan
 
     def add(self, stamp: float) -> None:
         """Count one more scan, taken at `stamp` [s]; NaN where it is not known."""
@@ -21,14 +24,25 @@ class Stamps:
         self._onwards += stamp > self._last
         self._back += stamp < self._last
         self._last = self._last if math.isnan(stamp) else stamp
+        self._first = stamp if math.isnan(self._first) else self._first
 
     @property
     def assumed(self) -> str:
         """What is assumed where they tell none; empty where they do."""
         if math.isnan(self._last) and self._scans > 1:
             return "scans follow each other evenly, as they have no stamps"
-        if self._scans < _FEW or self._onwards > self._back:
+        if self._scans < _FEW:
             return ""
+        if self._onwards > self._back:
+            return self._too_fast()
         if not self._back:
             return f"scans follow each other evenly, as all have the stamp {self._last:.6g}"
         return "scans follow each other evenly, as more of their stamps run back than on"
+
+    def _too_fast(self) -> str:
+        """What is assumed where they are those of no lidar, as when a whole log is sent at once."""
+        passed = self._last - self._first
+        if passed / self._scans >= SHORTEST:
+            return ""
+        told = f"{self._scans} stamps within {passed:.3g} s"
+        return f"scans follow each other evenly, as no lidar takes {told}; expected seconds"

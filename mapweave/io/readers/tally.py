@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mapweave.io.readers.options import ReadOptions
+from mapweave.io.readers.stamps import Stamps
 from mapweave.scan.scan import Scan
 
 MOST_ASSUMED = 4  # sentences in a warning: a log of more kinds of scans is not one anybody recorded
@@ -35,12 +36,14 @@ class Tally:
     foreign: int = 0
     cut_off: str | None = None
     _first: str = ""
+    _stamps: Stamps = field(default_factory=Stamps)
     _assumed: dict[str, None] = field(default_factory=dict)  # in the order of the file
 
     def add_scan(self, scan: Scan) -> None:
         """Count a whole scan."""
         self.scans += 1
         self.hits += int(scan.hits.sum())
+        self._stamps.add(scan.stamp)
 
     def add_damaged(self, number: int, error: Exception, *, foreign: bool = False) -> None:
         """Count a damaged piece, the `number`-th of the file."""
@@ -59,6 +62,7 @@ class Tally:
 
     def warn(self, path: Path | str, options: ReadOptions) -> None:
         """Warn once, if scans are used, of those that were not and of what was assumed."""
+        self.assume(self._stamps.assumed)
         found = [f"dropped {self._damage()}"] if self.damaged else []
         if self.cut_off:
             found.append(f"{self.cut_off}: its {self.scans} whole scans were read")

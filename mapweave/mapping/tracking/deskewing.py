@@ -15,6 +15,7 @@ import numpy as np
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
+from mapweave.scan.clock import ScanClock
 from mapweave.scan.scan import Scan
 
 LONGEST = 1.0  # [s] between scans that still tell how fast the robot is
@@ -32,19 +33,21 @@ class Deskewer:
     """
 
     def __init__(self) -> None:
-        self._placed: tuple[float, FloatArray] | None = None  # stamp [s] and pose of the last one
+        self._clock = ScanClock()
+        self._placed: tuple[Scan, FloatArray] | None = None  # the last one, and its pose
         self._velocity: FloatArray = np.zeros(3)
-        self._told: tuple[float, FloatArray] | None = None  # the same of odometry
+        self._told: tuple[Scan, FloatArray] | None = None  # the same of odometry
         self.to_stamp: FloatArray = np.zeros(3)
 
-    def placed(self, stamp: float, pose: FloatArray) -> None:
-        """Take in that a scan was placed at `pose` (3,) [m, m, rad], as of `stamp` [s]."""
+    def placed(self, scan: Scan, pose: FloatArray) -> None:
+        """Take in that `scan`, as it was straightened, was placed at `pose` (3,) [m, m, rad]."""
         if self._placed is not None:
-            self._velocity = _velocity(*self._placed, stamp, pose)
-        self._placed = stamp, pose
+            self._velocity = self._between(*self._placed, scan, pose)
+        self._placed = scan, pose
 
     def straight(self, scan: Scan) -> Scan:
         """Return `scan` with all returns as of mid-sweep, its stamp too; as it is without one."""
+        self._clock.tick(scan)
         told = self._told_velocity(scan)
         velocity = self._velocity if told is None else told
         self.to_stamp = -abs(scan.sweep) / 2 * velocity
@@ -61,8 +64,16 @@ class Deskewer:
         if scan.odometry is None:
             self._told = None
             return None
-        self._told = scan.stamp, scan.odometry
-        return None if before is None else _velocity(*before, scan.stamp, scan.odometry)
+        self._told = scan, scan.odometry
+        return None if before is None else self._between(*before, scan, scan.odometry)
+
+    def _between(self, last: Scan, first: FloatArray, scan: Scan, second: FloatArray) -> FloatArray:
+        """(3,) [m/s, m/s, rad/s] in the frame of `second` (3,); zero where the stamps tell none."""
+        since = self._clock.since(last.index, last.stamp, scan)
+        if self._clock.interval is None or since > LONGEST:
+            return np.zeros(3)
+        # Seen from the second pose, which is where the robot is now.
+        return -se2.between(second, first) / since
 
 
 def deskewed(scan: Scan, velocity: FloatArray) -> Scan:
@@ -109,12 +120,3 @@ def _resampled(angles: FloatArray, directions: FloatArray, distances: FloatArray
     found = np.where(one_surface, near + share * (far - near), nearest)
     apart = np.minimum(np.abs(angles - low), np.abs(high - angles))
     return np.where(apart <= step, found, np.nan)
-
-
-def _velocity(before: float, first: FloatArray, stamp: float, second: FloatArray) -> FloatArray:
-    """(3,) [m/s, m/s, rad/s] in the frame of `second` (3,); zero where the stamps tell none."""
-    since = stamp - before
-    if not 0.0 < since <= LONGEST:
-        return np.zeros(3)
-    # Seen from the second pose, which is where the robot is now.
-    return -se2.between(second, first) / since

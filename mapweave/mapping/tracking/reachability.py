@@ -1,15 +1,14 @@
 """How far a robot can have come between two scans: no farther than its speed and the time allow.
 
 Stamps are evidence of their own: they jitter, come in batches, repeat and run back. So the time
-between two scans is what their stamps say, or what so many scans usually take, whichever is more.
-Where stamps tell no time at all, nothing is bound here, and the pace of the robot has to do:
-`MotionModel.reach`.
+between two scans is what their stamps say, or what so many scans usually take, whichever is more
+(`ScanClock`). Where stamps tell no time at all, nothing is bound here, and the pace of the robot
+has to do: `MotionModel.reach`.
 """
 
 import math
 from collections import deque
 from collections.abc import Collection
-from statistics import median
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -18,6 +17,7 @@ from pydantic import Field
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.parameters import StageParameters, derived
+from mapweave.scan.clock import ScanClock
 from mapweave.scan.scan import Scan
 
 
@@ -32,8 +32,6 @@ class ReachabilityParameters(StageParameters):
     turn_slack: float = derived(
         lambda c: c.mapping.keyframe_turn, gt=0, description="[rad] more, as poses err"
     )
-    intervals: int = Field(60, ge=1, description="between scans, whose median is the usual one")
-    few: int = Field(10, ge=1, description="of them: as long as there are less, the longest is")
     window: float = Field(1.0, gt=0, description="[s] of the way that is bound as a whole, too")
     remembered: int = Field(60, ge=1, description="placed scans, the most, of that way")
 
@@ -51,38 +49,29 @@ class Reachability:
 
     def __init__(self, parameters: ReachabilityParameters) -> None:
         self._p = parameters
-        self._intervals: deque[float] = deque(maxlen=parameters.intervals)
-        self._interval: float | None = None  # of these
-        self._last: tuple[int, float] | None = None
+        self._clock = ScanClock()
         self._way: deque[_Stay] = deque(maxlen=parameters.remembered)
 
     def copy(self) -> Self:
         """Return one that goes on by itself from here."""
-        other = self.afresh()
-        other._last, other._way = self._last, self._way.copy()
+        other = type(self)(self._p)
+        other._clock, other._way = self._clock.copy(), self._way.copy()
         return other
 
     def afresh(self) -> Self:
         """Return one that knows how long scans take, and of no place."""
         other = type(self)(self._p)
-        other._intervals, other._interval = self._intervals.copy(), self._interval
+        other._clock = self._clock.afresh()
         return other
 
     @property
     def interval(self) -> float | None:
         """The time [s] that a scan usually takes; None where stamps do not tell."""
-        return self._interval
+        return self._clock.interval
 
     def tick(self, scan: Scan) -> None:
         """Note that `scan` was taken, be it placed or not."""
-        if self._last is not None:
-            index, stamp = self._last
-            interval = (scan.stamp - stamp) / max(scan.index - index, 1)
-            self._intervals.append(interval if math.isfinite(interval) else 0.0)
-            enough = len(self._intervals) >= self._p.few
-            usual = median(self._intervals) if enough else max(self._intervals)
-            self._interval = usual if usual > 0 else None
-        self._last = scan.index, scan.stamp
+        self._clock.tick(scan)
 
     def placed(self, scan: Scan, pose: FloatArray) -> None:
         """Note that `scan` was taken at `pose` (3,); what lies longer ago is let go."""
@@ -130,7 +119,4 @@ class Reachability:
         return np.asarray(possible.all(axis=1))
 
     def _time(self, stay: _Stay, scan: Scan) -> float:
-        """[s] between two scans, the longest that there is evidence for."""
-        counted = max(abs(scan.index - stay.number), 1) * (self.interval or 0.0)
-        told = abs(scan.stamp - stay.stamp)
-        return max(counted, told) if math.isfinite(told) else counted
+        return self._clock.since(stay.number, stay.stamp, scan)

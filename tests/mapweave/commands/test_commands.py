@@ -298,6 +298,21 @@ def test_what_came_before_a_line_of_another_format_is_mapped_and_the_line_is_nam
     assert len(read_map(output).submaps[0].trajectory.scan_index) == SCANS
 
 
+def test_scans_of_too_few_beams_fail_in_one_line_that_says_so(tmp_path: Path) -> None:
+    log = tmp_path / "few.log"
+    log.write_text("".join(f"FLASER 9{' 2.5' * 9} 0 0 0 0 0 0 {k} host {k}\n" for k in range(5)))
+    said = "none of its 5 chosen scans can be mapped; expected 10 beams or more, got 9"
+    assert_fails_in_one_line(main_here("map", log), log, said)
+
+
+def test_the_picture_of_a_grid_is_refused_by_the_name_of_its_settings(tmp_path: Path) -> None:
+    picture = tmp_path / "hall.pgm"
+    picture.write_bytes(b"P5 2 2 255\n0000")
+    (tmp_path / "hall.yaml").write_text("image: hall.pgm\n")
+    said = f"is the picture of a grid; expected {tmp_path / 'hall.yaml'}"
+    assert_fails_in_one_line(main_here("map", picture), picture, said)
+
+
 def test_a_missing_log_and_a_folder_fail_in_one_line(tmp_path: Path) -> None:
     missing = tmp_path / "nowhere.log"
     assert_fails_in_one_line(mapweave("map", missing), missing, "no such file", "expected")
@@ -435,6 +450,8 @@ def spoiled(content: dict[str, Any], how: str) -> str:
     submap = content["submaps"][0]
     if how == "missing":
         return json.dumps({**content, "submaps": [without(submap, "support")]})
+    if how == "name":
+        return json.dumps({**content, "robot": "Robot 1"})
     if how == "version":
         return json.dumps({**content, "format": "mapweave/map/2"})
     if how == "not finite":
@@ -447,6 +464,7 @@ SPOILED = {
     "version": ["format", "mapweave/map/1", "mapweave/map/2"],
     "not finite": ["submaps[0].pose[1]", "finite"],
     "cut off": ["expected a map file"],
+    "name": ["robot", "expected 1 to 32 characters", "found 'Robot 1'"],
 }
 
 

@@ -149,6 +149,12 @@ def test_which_odometry_there_is_is_told_where_it_is_not_plain(tmp_path: Path) -
         list(read_scans(several, odometry="/gps"))
     with pytest.raises(FileError, match="has no nav_msgs/msg/Odometry; expected one, or"):
         list(read_scans(write(two, "mcap", said(ROS2)), odometry=True))
+    moving = tf(transform("odom", "base_link", 1, 0, 0, 0, 100.0, ROS2), store=ROS2)
+    three = tmp_path / "three"
+    three.mkdir()
+    bag = write(three, "mcap", [*said(ROS2), ("/tf", TF_MESSAGE, moving)])
+    with pytest.raises(FileError, match="no odometry at /odom; there is none; its /tf has: --od"):
+        list(read_scans(bag, odometry="/odom"))
 
 
 def test_between_two_poses_the_robot_is_on_its_way_and_long_after_nowhere() -> None:

@@ -219,7 +219,10 @@ def test_where_other_lines_have_times_a_flaser_without_is_cut_off(tmp_path: Path
     assert "dropped 1 damaged line, the first line 2: FLASER has 11 words, expected 14" in said
 
 
-@pytest.mark.parametrize("stamps", [range(10, 0, -1), [5.0] * 12, ["nan"] * 3, ["inf", "nan"]])
+@pytest.mark.parametrize(
+    "stamps",
+    [range(10, 0, -1), [5.0] * 12, ["nan"] * 3, ["inf", "nan"], [5 + k / 1000 for k in range(12)]],
+)
 def test_stamps_that_tell_no_time_stay_and_what_is_assumed_is_said(
     stamps: list[object], tmp_path: Path
 ) -> None:

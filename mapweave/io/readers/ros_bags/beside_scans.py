@@ -118,8 +118,15 @@ def _odometry(
     if asked is None and not topics:
         raise FileError(path, f"has no {ODOMETRY}; expected one, or --odometry /tf, or none")
     if asked is not None and not any(t.strip("/") == asked.strip("/") for t in topics):
-        raise FileError(path, f"has no odometry at {asked}; there is {listed}")
+        holding = "; its /tf has: --odometry /tf" if _tf_tells(of_type, decoder) else ""
+        raise FileError(path, f"has no odometry at {asked}; there is {listed}{holding}")
     return track
+
+
+def _tf_tells(of_type: OfType, decoder: LaserDecoder) -> bool:
+    """Whether transforms have odometry."""
+    transforms = (_decoded(m, TF_MESSAGE, decoder, lambda _: None) for m in of_type(TF_MESSAGE, TF))
+    return any(any(odometry_in(decoded)) for decoded in transforms if decoded is not None)
 
 
 def _decoded(

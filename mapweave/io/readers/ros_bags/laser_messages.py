@@ -92,7 +92,7 @@ class LaserDecoder:
                 return self._ros1.deserialize_ros1(message.data, kind)
             return self._ros2.deserialize_cdr(message.data, kind)
         except (_serde_error(), struct.error, ValueError, IndexError) as error:
-            raise UnreadableMessageError(str(error) or "is not whole") from error
+            raise UnreadableMessageError(f"is no whole {kind}") from error
 
 
 def _serde_error() -> type[Exception]:

@@ -96,6 +96,16 @@ def test_a_weaving_robot_is_placed_better_where_it_is_known_when_beams_were_take
     assert told[1] < 0.5 * untold[1]
 
 
+def at(stamp: float, index: int = 0) -> Scan:
+    """Return a scan that was taken then."""
+    return Scan([2.0, 2.0], [0.0, 0.1], index, stamp)
+
+
+def go(deskewer: Deskewer, stamp: float, index: int, pose: list[float]) -> None:
+    """Have a scan taken, and placed."""
+    deskewer.placed(deskewer.straight(at(stamp, index)), np.array(pose))
+
+
 def test_the_robots_velocity_is_that_of_its_last_step_and_odometry_goes_before_it() -> None:
     angles = np.radians(np.arange(-45.0, 46.0))
     scan = Scan(np.full(91, 2.0), angles, stamp=0.2, sweep=0.1)
@@ -104,8 +114,8 @@ def test_the_robots_velocity_is_that_of_its_last_step_and_odometry_goes_before_i
     assert unknown.stamp == pytest.approx(0.25)
     assert unknown.sweep == 0.0
     np.testing.assert_array_equal(unknown.ranges, scan.ranges)
-    deskewer.placed(0.0, np.zeros(3))
-    deskewer.placed(0.1, np.array([0.1, 0.0, 0.0]))
+    go(deskewer, 0.0, 0, [0.0, 0.0, 0.0])
+    go(deskewer, 0.1, 1, [0.1, 0.0, 0.0])
     by_track = deskewer.straight(scan)
     np.testing.assert_allclose(by_track.ranges, deskewed(scan, np.array([1.0, 0, 0])).ranges)
     np.testing.assert_allclose(deskewer.to_stamp, [-0.05, 0.0, 0.0], atol=1e-12)
@@ -124,23 +134,34 @@ def test_stamps_that_tell_no_time_tell_no_velocity(stamps: tuple[float, float]) 
     scan = Scan(np.full(91, 2.0), np.radians(np.arange(-45.0, 46.0)), stamp=4.0, sweep=0.1)
     deskewer = Deskewer()
     for k, stamp in enumerate(stamps):
-        deskewer.placed(stamp, np.array([k * 1.0, 0.0, 0.5 * k]))
+        go(deskewer, stamp, k, [k * 1.0, 0.0, 0.5 * k])
     np.testing.assert_array_equal(deskewer.straight(scan).ranges, scan.ranges)
+
+
+def test_scans_that_come_in_batches_tell_the_velocity_of_evenly_spaced_ones() -> None:
+    """Ten scans of 10 Hz within 20 ms, each second: what was driven takes the time it takes."""
+    angles = np.radians(np.arange(-45.0, 46.0))
+    deskewer = Deskewer()
+    for k in range(60):
+        stamp = k // 10 + k % 10 * 0.002
+        straight = deskewer.straight(Scan(np.full(91, 2.0), angles, k, stamp, sweep=0.1))
+        deskewer.placed(straight, np.array([0.05 * k, 0.0, 0.0]))
+    np.testing.assert_allclose(deskewer.to_stamp, [-0.025, 0.0, 0.0], atol=0.008)
 
 
 def test_a_robot_that_hardly_moves_is_left_as_it_is() -> None:
     scan = Scan(np.full(91, 2.0), np.radians(np.arange(-45.0, 46.0)), stamp=0.2, sweep=0.1)
     deskewer = Deskewer()
-    deskewer.placed(0.0, np.zeros(3))
-    deskewer.placed(0.1, np.array([0.002, 0.001, 0.0005]))
+    go(deskewer, 0.0, 0, [0.0, 0.0, 0.0])
+    go(deskewer, 0.1, 1, [0.002, 0.001, 0.0005])
     np.testing.assert_array_equal(deskewer.straight(scan).ranges, scan.ranges)
 
 
 def test_a_scan_of_one_instant_is_not_touched() -> None:
     scan = Scan(np.full(91, 2.0), np.radians(np.arange(-45.0, 46.0)), stamp=0.2)
     deskewer = Deskewer()
-    deskewer.placed(0.0, np.zeros(3))
-    deskewer.placed(0.1, np.array([0.1, 0.0, 0.2]))
+    go(deskewer, 0.0, 0, [0.0, 0.0, 0.0])
+    go(deskewer, 0.1, 1, [0.1, 0.0, 0.2])
     assert deskewer.straight(scan) is scan
     assert not deskewer.to_stamp.any()
 
