@@ -39,6 +39,7 @@ from mapweave.scan.own_body import OwnBody, OwnBodyParameters
 from mapweave.scan.scan import UNNUMBERED, Scan
 
 AT_ONCE = 2  # scans that wait are placed with each one that comes: a loss holds nobody up
+LATE = 30  # scans that wait, from which on it counts for no more that one is looked for everywhere
 AGAIN = 4  # scans are taken with each one that comes, of those that are judged again
 SUSPENSE = 24  # times the patience, while it is open whether a robot sees itself
 
@@ -262,11 +263,20 @@ class Mapper:
         placed = lost = False
         left = AT_ONCE
         while self._waiting and left > 0:
+            if self._tracker.is_behind:
+                self._tracker.try_missed()
+                left -= self._turns(long=True)
+                continue
             is_last = self._waiting[0] is seen
             found, was_lost = self._take_first()
             placed, lost = placed or (found and is_last), lost or was_lost
-            left -= 1 if found else 2  # which is looked for among those missed as well
+            # What is missed is looked for everywhere, and among those missed as well.
+            left -= self._turns(long=self._tracker.searched) if found else AT_ONCE
         return placed, lost
+
+    def _turns(self, *, long: bool) -> int:
+        """Of AT_ONCE, how many are taken by placing a scan: all where that takes `long`."""
+        return AT_ONCE if long and len(self._waiting) <= LATE else 1
 
     def _take_first(self) -> tuple[bool, bool]:
         """Follow the robot to the first scan that waits; return the same of it."""
