@@ -16,7 +16,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import write_map
 from mapweave.io.readers import read_reference_poses, read_scans
 from mapweave.mapping.backend import BackendResult, FinishedSubmap
-from mapweave.mapping.mapper import AT_ONCE, Mapper
+from mapweave.mapping.mapper import AGAIN, AT_ONCE, Mapper
 from mapweave.mapping.placement import Placement
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.tracker import Found, Tracker
@@ -209,7 +209,7 @@ def test_a_loss_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
     assert costs[-1] == 1  # it has caught up
 
 
-def test_what_was_missed_is_tried_one_with_each_scan_once_the_robot_is_found_again(
+def test_what_was_missed_is_tried_two_with_each_scan_once_the_robot_is_found_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The map is the same as if all were tried at once, and no scan waits in the end."""
@@ -227,17 +227,17 @@ def test_what_was_missed_is_tried_one_with_each_scan_once_the_robot_is_found_aga
         tried = 0
         where.append(mapper.add(scan).placed)
         costs.append(tried)
-    assert sum(costs) == BLOCKED and max(costs) == 1
+    assert sum(costs) == BLOCKED > max(costs) == AT_ONCE
     assert where[-1]
-    monkeypatch.setattr("mapweave.mapping.mapper.LATE", -1)  # all at once, whatever it takes
-    monkeypatch.setattr("mapweave.mapping.mapper.AT_ONCE", 1000)
-    at_once = run(blocked(), np.empty((0, 3)))
-    for submap, other in zip(mapper.finish().submaps, at_once.map.submaps, strict=True):
+    prompt = Mapper("a", prompt=True)
+    for scan in blocked():
+        prompt.add(scan)
+    for submap, other in zip(mapper.finish().submaps, prompt.finish().submaps, strict=True):
         np.testing.assert_array_equal(submap.map.segments, other.map.segments)
         np.testing.assert_array_equal(submap.trajectory.pose, other.trajectory.pose)
 
 
-@pytest.mark.parametrize(("late", "most"), [(30, 1), (2, AT_ONCE)])
+@pytest.mark.parametrize(("late", "most"), [(30, 1), (2, AGAIN)])
 def test_beside_a_scan_that_is_looked_for_everywhere_none_is_placed_unless_many_wait(
     monkeypatch: pytest.MonkeyPatch, late: int, most: int
 ) -> None:
