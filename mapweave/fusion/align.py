@@ -229,7 +229,7 @@ def _told_coarsely(
     if len(places.scores) == 0:
         return None
     fields = first.coarse.field, second.coarse.field
-    middle = fields[1].oriented.points.mean(axis=0)
+    middle = fields[1].middle
     leaders = different(places.aligned, places.scores, middle, p.hypotheses)[:2]
     if places.scores.max() < p.decision.min_common:
         found = _decided(a, first, b, second, _as_hypotheses(places.aligned[leaders], fields, p), p)
@@ -244,7 +244,7 @@ def _told_coarsely(
 
 def _as_hypotheses(places: FloatArray, fields: Fields, p: FusionParameters) -> list[Hypothesis]:
     """Judge (k, 3) `places` by `fields`; how complex what is shared is, is not asked."""
-    middle = fields[1].oriented.points.mean(axis=0)
+    middle = fields[1].middle
     there = se2.transform_points
     return [Hypothesis(t, there(t, middle), verify(*fields, t, p.verification)) for t in places]
 
@@ -257,7 +257,7 @@ def _by_walls(
     Its rivals are among what was proposed. Not tried where cells tell that none will convince.
     """
     shifted, scores = propose_by_walls(first, second, p.hypotheses, p.verification)
-    middle = second.raster.oriented.points.mean(axis=0)
+    middle = second.raster.middle
     leaders = different(shifted, scores, middle, p.hypotheses)
     weight, least = p.verification.contradiction_weight, p.decision.min_confidence
     if may_be(scores[leaders[:2]].tolist(), weight, p.confidence) < least:

@@ -39,7 +39,7 @@ def _ranked(
     """Return the best two that differ of (k, 3) `aligned`."""
     fields = first.raster, second.raster
     verdicts = [verify(*fields, t, p.verification) for t in aligned]
-    middle = fields[1].oriented.points.mean(axis=0)
+    middle = fields[1].middle
     # Two that ended in the same place are one, and not each other's rival.
     ranked = different(aligned, np.array([v.score for v in verdicts]), middle, p.hypotheses)
     return [

@@ -223,7 +223,7 @@ class ComponentMerger:
         join, second = alignment.transform, self._shape(submaps, pair[1])
         if second is None or not self._leap_judge.leaps(submaps, pair, join):
             return False
-        middle = second.raster.oriented.points.mean(axis=0)
+        middle = second.raster.middle
         common = alignment.evidence.common or 0.0
         return not self._leap_judge.is_believed(pair, join, common, middle)
 

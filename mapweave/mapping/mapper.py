@@ -39,7 +39,8 @@ from mapweave.scan.own_body import OwnBody, OwnBodyParameters
 from mapweave.scan.scan import UNNUMBERED, Scan
 
 AT_ONCE = 2  # scans that wait are placed with each one that comes: a loss holds nobody up
-AGAIN = 4  # scans are taken with each one that comes, of those that are judged again
+LATE = 30  # scans that wait are so many, as where all are judged again, that it takes
+AGAIN = 4  # with each one that comes, to catch up
 SUSPENSE = 24  # times the patience, while it is open whether a robot sees itself
 
 
@@ -85,6 +86,9 @@ class Mapper:
     live
         Whether no scan may wait for the backend: where that is late, finished submaps queue for
         it, and its outcome is adopted later.
+    prompt
+        Whether what takes long is done at once: else the scans that come meanwhile wait, so that
+        none takes much longer than others; the map is the same.
     on_warning
         Told in words what is odd about the scans, once: that the robot sees itself.
     known
@@ -104,6 +108,7 @@ class Mapper:
         config: Config | None = None,
         *,
         live: bool = False,
+        prompt: bool = False,
         on_warning: Callable[[str], None] | None = None,
         known: RobotMap | None = None,
         draw: Draw = draw_here,
@@ -123,9 +128,9 @@ class Mapper:
         self._on_warning = on_warning
         self._said: set[str] = set()  # of what is odd
         self._body = OwnBody(self.parameters.own_body)
-        # Scans to be placed: the last, and after a loss those that were missed before it.
+        # Scans to be placed before those: after a loss, those that were missed.
         self._waiting: deque[Observation] = deque()
-        self._again: deque[Scan] = deque()  # raw scans to be taken once more, and those since
+        self._again: deque[Scan] = deque()  # raw scans to be taken, some of them once more
         # Raw scans so far, as long as no submap is finished.
         self._early: deque[Scan] = deque(maxlen=self.parameters.backend.submap.max_scans)
         self._sweeps = SweepJudge(self.parameters.sweeps)
@@ -136,6 +141,7 @@ class Mapper:
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         backend = backend or Backend(self.parameters.backend, self._finished)
+        self._prompt = prompt
         self._unsettled = SettlingQueue(backend, live=live)
         self._draw = draw
         self._follows = False  # whether the growing submap was tracked from the last finished one
@@ -189,10 +195,8 @@ class Mapper:
         if self._is_finished:
             return self.robot_map()
         self._is_finished = True
-        while self._again:
-            self._take(self._again.popleft())
-        while self._waiting:
-            self._take_first()
+        while self._waiting or self._again:
+            self._go_on()
         self._merge_all(self._tracker.settle())
         if not self._growing.is_empty:
             self._finish_submap()
@@ -243,42 +247,59 @@ class Mapper:
         return scan if scan.index == index else replace(scan, index=index)
 
     def _take_next(self, scan: Scan) -> tuple[bool, bool]:
-        """Take a raw scan, or put it last while others are judged again; return as `_take`."""
+        """Take a raw scan after those that wait, some with each one that comes.
+
+        Return whether it is placed, and whether the robot was lost. What takes long is done alone.
+        """
         self._again.append(scan)
+        late = self._is_late
+        if self._try_missed() and not late:
+            return False, False
         placed = lost = False
-        for _ in range(min(AGAIN, len(self._again))):
-            first = self._again.popleft()
-            found, was_lost = self._take(first)
-            placed, lost = found and first is scan, lost or was_lost
-        return placed, lost
-
-    def _take(self, scan: Scan) -> tuple[bool, bool]:
-        """Follow the robot to a raw scan; return whether it is placed, and whether it was lost."""
-        if not self._has_finished:
-            self._early.append(scan)
-        straight = self._deskewer.straight(self._sweeps.swept(self._body.without(scan)))
-        seen = self.seen = observe(straight, self.parameters.observation)
-        self._waiting.append(seen)
-        placed = lost = False
-        left = AT_ONCE
-        while self._waiting and left > 0:
-            is_last = self._waiting[0] is seen
-            found, was_lost = self._take_first()
-            placed, lost = placed or (found and is_last), lost or was_lost
+        left = AGAIN if late else AT_ONCE
+        while left > 0 and (self._waiting or self._again):
+            index, found, was_lost = self._go_on()
+            placed, lost = found and index == scan.index, lost or was_lost
             left -= 1 if found else 2  # which is looked for among those missed as well
+            if self._tracker.searched and not late:
+                break
         return placed, lost
 
-    def _take_first(self) -> tuple[bool, bool]:
-        """Follow the robot to the first scan that waits; return the same of it."""
-        seen = self._waiting.popleft()
+    @property
+    def _is_late(self) -> bool:
+        """Whether scans are placed whatever that takes."""
+        return self._prompt or len(self._waiting) + len(self._again) > LATE
+
+    def _try_missed(self) -> bool:
+        """Try some of the scans that were missed before the robot was found again, if any were."""
+        left = AT_ONCE
+        while self._tracker.is_behind and left > 0:
+            self._tracker.try_missed()
+            left -= 1
+        return left < AT_ONCE
+
+    def _go_on(self) -> tuple[int, bool, bool]:
+        """Follow the robot to the next scan.
+
+        Return its index, whether it is placed, and whether the robot was lost.
+        """
+        seen = self._waiting.popleft() if self._waiting else self._observe(self._again.popleft())
         placed = self._place(seen)
         if placed:
             self._deskewer.placed(seen.scan, self._tracker.pose)
         self._loss.note(seen, self._tracker, placed=placed)
         if not self._loss.is_certain(len(self._tracker.missed), self._patience(seen)):
-            return placed, False
+            return seen.scan.index, placed, False
         self._start_again()
-        return False, True
+        return seen.scan.index, False, True
+
+    def _observe(self, scan: Scan) -> Observation:
+        """Return what a raw scan shows, as far as it is known what of it is the robot."""
+        if not self._has_finished:
+            self._early.append(scan)
+        straight = self._deskewer.straight(self._sweeps.swept(self._body.without(scan)))
+        self.seen = observe(straight, self.parameters.observation)
+        return self.seen
 
     def _patience(self, seen: Observation) -> int:
         """How many scans may be missed: more until it is known whether the robot sees itself.

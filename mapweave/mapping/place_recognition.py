@@ -110,6 +110,6 @@ class PlaceRecognizer:
 
     def _agree(self, before: RecognizedPlace, found: RecognizedPlace, newest: PreparedMap) -> bool:
         """Whether the part before was found at the same place."""
-        middle = newest.raster.oriented.points.mean(axis=0)
+        middle = newest.raster.middle
         apart, turned = difference(before.transform, found.transform, middle)
         return apart <= self._p.agreement.distance and turned <= self._p.agreement.turn

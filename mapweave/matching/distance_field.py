@@ -65,8 +65,8 @@ class DistanceField:
         (rows, columns) [m] from the edge of the seen free space inwards; 0 outside of it.
     codes
         (rows, columns) what cells say, by the limits that it hangs on; filled by what asks for it.
-    things
-        (n,) which samples are of what may have been moved, by its limits; filled in the same way.
+    missing
+        (n,) what a metre of wall counts that is not there, by what it hangs on; filled likewise.
     """
 
     oriented: OrientedPoints
@@ -80,7 +80,7 @@ class DistanceField:
     codes: dict[tuple[float, float], rasters.Codes] = field(
         default_factory=dict, init=False, repr=False
     )
-    things: dict[tuple[float, float], BoolArray] = field(
+    missing: dict[tuple[float, float, float], FloatArray] = field(
         default_factory=dict, init=False, repr=False
     )
 
@@ -116,6 +116,11 @@ class DistanceField:
             *(self.nearest, self.distance, self.depth),
             *(self.origin, self.cell),
         )
+
+    @cached_property
+    def middle(self) -> FloatArray:
+        """(2,) of its walls [m]."""
+        return np.asarray(self.oriented.points.mean(axis=0))
 
     @cached_property
     def own_depth(self) -> Float32Array:

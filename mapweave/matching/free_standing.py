@@ -19,12 +19,8 @@ def free_standing(raster: DistanceField, gap: float, max_side: float) -> BoolArr
     max_side
         [m] of the longer side of what may be moved.
     """
-    limits = gap, max_side
-    if limits not in raster.things:
-        reach = max(gap / 2 - raster.cell / 2, 0.0)
-        found = standing_free(
-            *(raster.oriented.points, raster.origin, raster.cell),
-            *(raster.distance, reach, max_side),
-        )
-        raster.things[limits] = found
-    return raster.things[limits]
+    reach = max(gap / 2 - raster.cell / 2, 0.0)
+    return standing_free(
+        *(raster.oriented.points, raster.origin, raster.cell),
+        *(raster.distance, reach, max_side),
+    )

@@ -132,7 +132,7 @@ def hypothesise(
         few = p.proposal_samples // 4
         first = coarse_scores(reference.raster, other.raster, proposals, few, verification)
         proposals = proposals[np.argpartition(-first, p.max_proposals)[: p.max_proposals]]
-    middle = other.raster.oriented.points.mean(axis=0)
+    middle = other.raster.middle
     rough = coarse_scores(
         reference.raster, other.raster, proposals, p.proposal_samples, verification
     )

@@ -274,8 +274,14 @@ def _limits(p: VerificationParameters) -> Limits:
 
 
 def worth_of_missing(other: DistanceField, p: VerificationParameters) -> FloatArray:
-    """(n,) what a metre of wall counts that is not there: a wall that is gone, in full."""
-    if p.moved_weight == 1:
-        return np.ones(len(other.weight))
-    moved = free_standing(other, p.moved_gap, p.moved_side)
-    return np.where(moved, p.moved_weight, 1.0)
+    """(n,) what a metre of wall counts that is not there: a wall that is gone, in full.
+
+    Worked out once.
+    """
+    limits = p.moved_gap, p.moved_side, p.moved_weight
+    if limits not in other.missing:
+        missing = np.ones(len(other.weight))
+        if p.moved_weight < 1:
+            missing[free_standing(other, p.moved_gap, p.moved_side)] = p.moved_weight
+        other.missing[limits] = missing
+    return other.missing[limits]

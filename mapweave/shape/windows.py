@@ -242,16 +242,18 @@ def match(a: Windows, b: Windows, parameters: WindowParameters) -> Candidates:
     product = a.codes[rows] / a.codes.shape[1] @ b.codes[columns].conj().T
     ours, theirs = _samples(a, rows, straight), _samples(b, columns, others)
     pairs = alike_windows(product, ours, theirs, parameters.min_similarity, parameters.min_gain)
-    found = Candidates(
-        a.length * (pairs.gain - pairs.residual / parameters.residual_scale),
-        pairs.similarity,
-        pairs.transform,
-        pairs.residual,
-        np.full(len(pairs.row), a.length),
-        rows[pairs.row],
-        columns[pairs.column],
+    score = a.length * (pairs.gain - pairs.residual / parameters.residual_scale)
+    close = np.flatnonzero(pairs.residual <= parameters.max_residual)
+    kept = close[np.argsort(-score[close], kind="stable")[: parameters.max_candidates]]
+    return Candidates(
+        score[kept],
+        pairs.similarity[kept],
+        pairs.transform[kept],
+        pairs.residual[kept],
+        np.full(len(kept), a.length),
+        rows[pairs.row[kept]],
+        columns[pairs.column[kept]],
     )
-    return best(found.take(found.residual <= parameters.max_residual), parameters.max_candidates)
 
 
 def match_all(

@@ -283,5 +283,5 @@ def _covariance(edge: Edge, p: AlignmentGraphParameters) -> FloatArray:
 
 def frame_at_middle(raster: DistanceField | None) -> FloatArray:
     """Return the (3,) frame at the middle of a map's wall; the map's own where it has seen none."""
-    x, y = raster.oriented.points.mean(axis=0) if raster else (0.0, 0.0)
+    x, y = raster.middle if raster else (0.0, 0.0)
     return np.array([x, y, 0.0])

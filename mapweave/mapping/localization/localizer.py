@@ -121,6 +121,7 @@ class Localizer:
             _TrackedOnly(),
             config,
             live=live,
+            prompt=True,  # a scan is on the path where it was placed when it came
             on_warning=on_warning,
         )
         self._live = live

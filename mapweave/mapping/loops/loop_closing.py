@@ -135,7 +135,7 @@ class LoopCloser:
         p = self._parameters
         (reference, target), (other, _) = self._seen(older.map), self._seen(newest.map)
         believed = se2.between(older.pose, newest.pose)
-        middle = other.oriented.points.mean(axis=0)
+        middle = other.middle
         starts = _around(believed, middle, path, p)
         scores = coarse_scores(reference, other, starts, p.max_samples, p.verification)
         leaders = different(starts, scores, middle, p.hypotheses)

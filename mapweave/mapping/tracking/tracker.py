@@ -72,6 +72,8 @@ class Tracker:
     missed
         The scans since then, which fitted nowhere, were not confirmed by the next one, or were
         blind: these show nothing, but they took their time.
+    searched
+        Whether the last scan was looked for everywhere within reach: that takes long.
     """
 
     def __init__(
@@ -81,6 +83,7 @@ class Tracker:
         self._sweeps = sweeps
         self.pose: FloatArray = se2.IDENTITY
         self.missed: list[Observation] = []
+        self.searched = False
         self._motion = MotionModel(self.parameters.motion_model)
         sigma = self.parameters.prior_sigma, self.parameters.prior_sigma, self.parameters.prior_turn
         self._prior = np.diag(np.array(sigma) ** -2)
@@ -90,6 +93,7 @@ class Tracker:
         self._drift = Drift(self.parameters.drift)
         self._before: _State | None = None  # of the scan on probation
         self._probation: Found = []
+        self._untried: list[Observation] = []  # missed before that one, the last of them first
 
     def afresh(self, *, trusting: bool = False) -> "Tracker":
         """Return a tracker of the same robot that knows no place: it moves as it did.
@@ -122,6 +126,8 @@ class Tracker:
             All scans that are placed by now and were not before; nothing where this one fits
             nowhere, or is on probation.
         """
+        self._catch_up()
+        self.searched = False
         self._reachability.tick(seen.scan)
         if self.is_blind(seen):
             self.missed += [] if self._local.is_empty else [seen]
@@ -144,6 +150,7 @@ class Tracker:
 
     def settle(self) -> Found:
         """Believe the scan on probation, and return it with those found with it."""
+        self._catch_up()
         found, self._probation, self._before = self._probation, [], None
         return found
 
@@ -154,7 +161,26 @@ class Tracker:
             self.pose, missed, self._motion, self._odometry, self._local, *_ = before = self._before
             self._reachability, self._drift = before.reachability, before.drift
             self.missed = [*missed, *since]
-        self._before, self._probation = None, []
+        self._before, self._probation, self._untried = None, [], []
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether scans that were missed are still to be tried; `place` tries them all first."""
+        return bool(self._untried)
+
+    def try_missed(self) -> None:
+        """Try one of the scans that were missed, from the scan on probation backwards."""
+        seen, (after, there) = self._untried.pop(0), self._probation[-1]
+        reach = self._reachability.between(seen.scan, after.scan)
+        tracked = self.revisit(seen, there.pose, reach)
+        if tracked is None:
+            return
+        if self._reachability.joins(seen.scan, tracked.pose, after.scan, there.pose):
+            self._probation.append((seen, tracked))
+
+    def _catch_up(self) -> None:
+        while self.is_behind:
+            self.try_missed()
 
     def is_blind(self, seen: Observation) -> bool:
         """Whether a scan shows too little to be placed anywhere."""
@@ -194,7 +220,9 @@ class Tracker:
             not is_open(tracked, self.parameters.acceptance),
         )
         self._local.remember(seen.scan, seen.walls, loose, tracked.pose, held=held)
-        return [(seen, tracked), *self._found_again(seen.scan)]
+        self._untried = [each for each in reversed(self.missed) if not self.is_blind(each)]
+        self.missed = []
+        return [(seen, tracked)]
 
     def _relied_on(self, seen: Observation, near: FloatArray) -> Observation:
         """Return what of `seen` tells where it was taken, which is `near` (3,).
@@ -230,19 +258,6 @@ class Tracker:
             self._motion.add(step, np.zeros((3, 3)) if is_open else tracked.information)
         return replace(tracked, drift=self._drift.covariance)
 
-    def _found_again(self, last: Scan) -> Found:
-        """Try the scans that were missed before the `last` one, from there backwards."""
-        found, pose = [], self.pose
-        for seen in reversed([seen for seen in self.missed if not self.is_blind(seen)]):
-            tracked = self.revisit(seen, pose, self._reachability.between(seen.scan, last))
-            if tracked is None:
-                continue
-            if self._reachability.joins(seen.scan, tracked.pose, last, pose):
-                found.append((seen, tracked))
-                pose, last = tracked.pose, seen.scan
-        self.missed = []
-        return found
-
     def _locate(
         self, seen: Observation, predicted: FloatArray, known: Callable[[], LineMap]
     ) -> ScanMatch | None:
@@ -266,6 +281,7 @@ class Tracker:
                 if is_unremarkable(best, self._turn_to(best), a):
                     return self._beside_others(best, found)
                 break
+        self.searched = True
         found += self._reached(seen, self._searched(seen, predicted[0], np.pi))
         return self._best_of_all(seen, found)
 

@@ -16,7 +16,7 @@ from mapweave.geometry.arrays import FloatArray
 from mapweave.io.map_files import write_map
 from mapweave.io.readers import read_reference_poses, read_scans
 from mapweave.mapping.backend import BackendResult, FinishedSubmap
-from mapweave.mapping.mapper import AT_ONCE, Mapper
+from mapweave.mapping.mapper import AGAIN, AT_ONCE, Mapper
 from mapweave.mapping.placement import Placement
 from mapweave.mapping.tracking.observation import Observation
 from mapweave.mapping.tracking.tracker import Found, Tracker
@@ -33,6 +33,7 @@ from tests.mapweave.buildings import (
 )
 
 TOUR = [(1, 1), (3.5, 1), (3.5, -2), (3.5, 1), (13, 1), (13, -3), (13, 1), (18, 1.2)]
+BLOCKED = 3  # scans in a row that show another place: fewer than a robot is lost after
 
 
 @dataclass(frozen=True)
@@ -206,6 +207,68 @@ def test_a_loss_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
         costs.append(asked)
     assert lost and max(costs) == AT_ONCE < mapper.parameters.patience
     assert costs[-1] == 1  # it has caught up
+
+
+def test_what_was_missed_is_tried_two_with_each_scan_once_the_robot_is_found_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The map is the same as if all were tried at once, and no scan waits in the end."""
+    tried = 0
+    revisit = Tracker.revisit
+
+    def counted(tracker: Tracker, seen: Observation, near: FloatArray, reach: float) -> object:
+        nonlocal tried
+        tried += 1
+        return revisit(tracker, seen, near, reach)
+
+    monkeypatch.setattr(Tracker, "revisit", counted)
+    mapper, costs, where = Mapper("a"), [], list[bool]()
+    for scan in blocked():
+        tried = 0
+        where.append(mapper.add(scan).placed)
+        costs.append(tried)
+    assert sum(costs) == BLOCKED > max(costs) == AT_ONCE
+    assert where[-1]
+    prompt = Mapper("a", prompt=True)
+    for scan in blocked():
+        prompt.add(scan)
+    for submap, other in zip(mapper.finish().submaps, prompt.finish().submaps, strict=True):
+        np.testing.assert_array_equal(submap.map.segments, other.map.segments)
+        np.testing.assert_array_equal(submap.trajectory.pose, other.trajectory.pose)
+
+
+@pytest.mark.parametrize(("late", "most"), [(30, 1), (2, AGAIN)])
+def test_beside_a_scan_that_is_looked_for_everywhere_none_is_placed_unless_many_wait(
+    monkeypatch: pytest.MonkeyPatch, late: int, most: int
+) -> None:
+    placed = 0
+    place = Mapper._place
+
+    def noted(mapper: Mapper, seen: Observation) -> bool:
+        nonlocal placed
+        placed += 1
+        found = place(mapper, seen)
+        mapper._tracker.searched = True
+        return found
+
+    monkeypatch.setattr(Mapper, "_place", noted)
+    monkeypatch.setattr("mapweave.mapping.mapper.LATE", late)
+    mapper, costs, lost = Mapper("a"), [], 0
+    for scan in jumping():
+        placed = 0
+        lost += mapper.add(scan).lost
+        costs.append(placed)
+    assert lost and max(costs) == most
+
+
+def blocked() -> list[Scan]:
+    """Return scans of a robot that sees another place for a moment."""
+    scans, _ = scans_along(BUILDING, TOUR[:5], 1)
+    others, _ = scans_along(OTHER_BUILDING, [(5, 1.5), (9, 1.5)], 2)
+    first = len(scans) // 2
+    for k in range(BLOCKED):
+        scans[first + k] = replace(others[k], index=first + k, stamp=scans[first + k].stamp)
+    return scans
 
 
 def test_a_map_that_ends_with_a_loss_holds_the_scans_that_waited() -> None:
