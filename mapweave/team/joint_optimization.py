@@ -147,18 +147,23 @@ class JointOptimizer:
         self.turn()
 
     def turn(
-        self, *, patient: bool = False, is_overtaken: Callable[[], bool] | None = None
+        self,
+        *,
+        patient: bool = False,
+        is_awaited: bool = True,
+        is_overtaken: Callable[[], bool] = lambda: False,
     ) -> None:
         """Begin another version; one that is `patient` waits for all its comparisons.
 
         Parameters
         ----------
+        is_awaited
+            Whether somebody waits for it: then it makes few.
         is_overtaken
-            Of a version that nobody waits for, asked before each comparison: whether something has
-            come since. None where somebody waits.
+            If not, asked before each of them: whether something has come since.
         """
         self._tracks.turn()
-        self._patient, self._is_overtaken = patient, is_overtaken
+        self._patient, self._is_awaited, self._is_overtaken = patient, is_awaited, is_overtaken
         self._asked = self._made = 0
         self.has_more = False
 
@@ -281,7 +286,7 @@ class JointOptimizer:
         """Whether further comparisons are for the next version."""
         if self._patient:
             return False
-        if self._is_overtaken is None:
+        if self._is_awaited:
             return self._made >= self._p.at_once
         return self._made >= self._p.beside or self._is_overtaken()
 
