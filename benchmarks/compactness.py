@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.geometry.segments import sample, units
+from mapweave.geometry.segments import units
+from mapweave.kernels.lines.sampling import sample_parts
 from mapweave.lines.sightings import Nearness
 
 DOUBLE = (0.03, 0.3)  # [m] between the two of a doubled wall
@@ -56,7 +57,7 @@ def compactness(segments: FloatArray) -> Compactness:
 
 def doubled_share(segments: FloatArray) -> float:
     """Return the share of the length of (n, 4) `segments` [m] that is drawn twice."""
-    points, directions, parts, owner = sample(segments, STEP)
+    points, directions, parts, owner = sample_parts(segments, STEP)
     near = Nearness.of(segments, points, directions, DOUBLE[1])
     _, lengths = units(segments)
     beside = (near.along >= 0) & (near.along <= lengths[near.segment])

@@ -103,14 +103,21 @@ class VersionBuilder:
         begun: float,
         *,
         patient: bool = False,
-        is_overtaken: Callable[[], bool] | None = None,
+        is_awaited: bool = True,
+        is_overtaken: Callable[[], bool] = lambda: False,
     ) -> None:
         """Start building `draft`, made of all that was known at `begun` [s since 1970].
 
-        If it is `patient` nothing waits for the next version, however long this one takes. One that
-        nobody waits for is given up when it `is_overtaken`, asked in the builder's thread.
+        If it is `patient` nothing waits for the next version, however long this one takes. It is
+        given up when it `is_overtaken`, asked in the builder's thread.
         """
-        self._future = self._worker.submit(self._build, draft, begun, patient, is_overtaken)
+
+        def build() -> JointMap:
+            return draft.build(
+                self._builder, patient=patient, is_awaited=is_awaited, is_overtaken=is_overtaken
+            )
+
+        self._future = self._worker.submit(self._build, draft, begun, build)
         self._future.add_done_callback(lambda _: self._ready())
 
     def take(self) -> Built | None:
@@ -135,10 +142,8 @@ class VersionBuilder:
         message, payload = self._packed(built.joint)
         return replace(built, message=message, payload=payload)
 
-    def _build(
-        self, draft: Draft, begun: float, patient: bool, is_overtaken: Callable[[], bool] | None
-    ) -> Built:
-        joint = draft.build(self._builder, patient=patient, is_overtaken=is_overtaken)
+    def _build(self, draft: Draft, begun: float, build: Callable[[], JointMap]) -> Built:
+        joint = build()
         return Built(draft, begun, joint, *self._packed(joint), self._builder.has_more)
 
     def _packed(self, joint: JointMap) -> tuple[JointMapMessage, bytes]:

@@ -89,6 +89,8 @@ class Coordinator:
         self._urgency = Urgency.NONE
         self._draft: Draft | None = None
         self._drafted = Urgency.NONE
+        self._has_another_map = False  # since the draft
+        self._is_begun_anew = False  # the draft, after an awaited one was given up
         self._begun = self._drafted_at = -math.inf
 
     @property
@@ -111,9 +113,15 @@ class Coordinator:
         """Whether the draft has something in it that was received, and not only compares more."""
         return self._drafted > Urgency.MORE
 
-    def has_more_to_tell(self) -> bool:
-        """Tell whether something was received since the draft; usable from another thread."""
-        return self._urgency > Urgency.MORE
+    def is_overtaken(self) -> bool:
+        """Tell whether the draft should give way to another one; usable from another thread.
+
+        One that only compares more keeps nobody waiting. One that is awaited is begun anew once,
+        early, for a map that comes meanwhile: that waits for one version then and not for two.
+        """
+        if not self.is_awaited:
+            return self._urgency > Urgency.MORE
+        return self._has_another_map and not self._is_begun_anew
 
     @property
     def maps_held(self) -> tuple[MapVersion, ...]:
@@ -199,6 +207,7 @@ class Coordinator:
         same = [run_of(held) for held in self._runs_of(new.robot) if clash(held, new)]
         self._clashing.update([*same, run_of(new)] if same else [])
         self._remember_state(new)
+        self._has_another_map = True
         self._raise_urgency(Urgency.SOON)
         return True
 
@@ -274,15 +283,20 @@ class Coordinator:
         orders = self._said.orders(self._maps, self._shown_maps)
         self._draft = Draft(self._version + 1, self.maps, alignments, self._judged, orders)
         self._drafted, self._urgency = self._urgency, Urgency.NONE
+        self._has_another_map = False
         self._drafted_at = now
         return self._draft
 
     def finish(self, joint: JointMap | None, *, has_more: bool = False) -> None:
         """End the draft that became `joint`; None, where it was not built, keeps its number.
 
-        Where what is known `has_more` in it than was made of it, another version follows.
+        Where what is known `has_more` in it than was made of it, another version follows. What
+        follows one that was not built is as urgent.
         """
         self._raise_urgency(Urgency.MORE if has_more else Urgency.NONE)
+        self._is_begun_anew = joint is None and self.is_awaited
+        if joint is None and self.has_news:
+            self._raise_urgency(self._drafted)
         if joint is not None:
             self._version, self._judged = joint.version, joint.alignments
             self._is_last_known, self._begun = True, self._drafted_at

@@ -46,7 +46,8 @@ class Draft:
         builder: JointMapBuilder,
         *,
         patient: bool = False,
-        is_overtaken: Callable[[], bool] | None = None,
+        is_awaited: bool = True,
+        is_overtaken: Callable[[], bool] = lambda: False,
     ) -> JointMap:
         """Return the joint map; what it revokes of the last version, it names.
 
@@ -56,14 +57,18 @@ class Draft:
             Keeps what it made for the versions before.
         patient
             Whether nothing may wait for the next version.
+        is_awaited
+            Whether somebody waits for this one; if not, it only goes on comparing.
         is_overtaken
-            Where nobody waits for this one, asked now and then: whether another one is due.
+            Asked now and then: whether to give it up for one that has more in it.
 
         Raises
         ------
         OvertakenError
-            If one was.
+            If it was given up.
         """
         known = self.maps, self.alignments, self.version, self.orders
-        joint = builder.build(*known, patient=patient, is_overtaken=is_overtaken)
+        joint = builder.build(
+            *known, patient=patient, is_awaited=is_awaited, is_overtaken=is_overtaken
+        )
         return mark_revoked(joint, self.before)

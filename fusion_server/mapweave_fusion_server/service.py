@@ -161,10 +161,13 @@ class Service:
     def _begin(self, *, patient: bool = False) -> None:
         self._covers = self._store.news
         draft = self._coordinator.begin(time.monotonic())
-        # What only goes on comparing keeps nobody waiting who comes meanwhile.
-        needed = patient or self._coordinator.is_awaited
-        overtaken = None if needed else self._coordinator.has_more_to_tell
-        self._builder.start(draft, time.time(), patient=patient, is_overtaken=overtaken)
+        self._builder.start(
+            draft,
+            time.time(),
+            patient=patient,
+            is_awaited=self._coordinator.is_awaited,
+            is_overtaken=self._coordinator.is_overtaken,
+        )
 
     def _conclude(self) -> None:
         built = self._builder.take()

@@ -1,4 +1,4 @@
-// Points in the cells of a grid, to be found again along a segment or around a place.
+// A grid over points: its cells along a segment, and points by the cell that they are in.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 #include <stdexcept>
 #include <vector>
 
-// Points by the cell of a grid that they are in; within a cell in their order.
-class Grid {
+// A grid of cells that covers points.
+class Cells {
  public:
-  Grid(const double* points, size_t count, double cell) : cell_(cell) {
+  Cells(const double* points, size_t count, double cell) : cell_(cell) {
     double high[2] = {0, 0};
     for (size_t i = 0; i < count; ++i)
       for (int k = 0; k < 2; ++k) {
@@ -22,22 +22,18 @@ class Grid {
     const double most = 16.0 * static_cast<double>(count) + 65536.0;
     while (((high[0] - low_[0]) / cell_ + 1) * ((high[1] - low_[1]) / cell_ + 1) > most) cell_ *= 2;
     for (int k = 0; k < 2; ++k) size_[k] = static_cast<int64_t>((high[k] - low_[k]) / cell_) + 1;
-    std::vector<int64_t> key(count);
-    start_.assign(static_cast<size_t>(size_[0] * size_[1]) + 1, 0);
-    for (size_t i = 0; i < count; ++i) {
-      key[i] = index(points[2 * i + 1], 1) * size_[0] + index(points[2 * i], 0);
-      ++start_[key[i] + 1];
-    }
-    for (size_t k = 1; k < start_.size(); ++k) start_[k] += start_[k - 1];
-    order_.resize(count);
-    std::vector<int64_t> next(start_.begin(), start_.end() - 1);
-    for (size_t i = 0; i < count; ++i) order_[next[key[i]]++] = static_cast<int64_t>(i);
   }
 
-  // Calls `use(i)` for each point in a cell within `reach` of a segment, and for some more.
+  double cell() const { return cell_; }
+  size_t count() const { return static_cast<size_t>(size_[0] * size_[1]); }
+
+  // The cell of one of the points.
+  int64_t of(const double* point) const { return index(point[1], 1) * size_[0] + index(point[0], 0); }
+
+  // Calls `use(first, last)` for each run of cells that has all within `reach` of a segment, and some more.
   template <typename F>
   void along(const double* s, double reach, F&& use) const {
-    if (order_.empty()) return;
+    if (!count()) return;
     const double dx = s[2] - s[0], dy = s[3] - s[1];
     const int64_t first = clip(std::floor((std::min(s[1], s[3]) - reach - low_[1]) / cell_), 1);
     const int64_t last = clip(std::floor((std::max(s[1], s[3]) + reach - low_[1]) / cell_), 1);
@@ -54,12 +50,36 @@ class Grid {
       const double a = s[0] + from * dx, b = s[0] + to * dx;
       const int64_t left = clip(std::floor((std::min(a, b) - reach - kSlack - low_[0]) / cell_), 0);
       const int64_t right = clip(std::floor((std::max(a, b) + reach + kSlack - low_[0]) / cell_), 0);
-      const int64_t begin = start_[row * size_[0] + left], end = start_[row * size_[0] + right + 1];
-      for (int64_t k = begin; k < end; ++k) use(order_[k]);
+      use(row * size_[0] + left, row * size_[0] + right);
     }
   }
 
-  double cell() const { return cell_; }
+ protected:
+  double cell_, low_[2] = {0, 0};
+  int64_t size_[2] = {0, 0};
+
+ private:
+  static constexpr double kSlack = 1e-9;
+
+  int64_t index(double v, int k) const { return static_cast<int64_t>((v - low_[k]) / cell_); }
+  int64_t clip(double v, int k) const {
+    return static_cast<int64_t>(std::min(std::max(v, 0.0), static_cast<double>(size_[k] - 1)));
+  }
+};
+
+// Points by the cell of a grid that they are in; within a cell in their order.
+class Grid : private Cells {
+ public:
+  using Cells::cell;
+
+  Grid(const double* points, size_t count, double cell) : Cells(points, count, cell), start_(Cells::count() + 1, 0) {
+    std::vector<int64_t> key(count);
+    for (size_t i = 0; i < count; ++i) ++start_[(key[i] = of(points + 2 * i)) + 1];
+    for (size_t k = 1; k < start_.size(); ++k) start_[k] += start_[k - 1];
+    order_.resize(count);
+    std::vector<int64_t> next(start_.begin(), start_.end() - 1);
+    for (size_t i = 0; i < count; ++i) order_[next[key[i]]++] = static_cast<int64_t>(i);
+  }
 
   // Calls `use(i)` for each point in the cells that are `ring` cells away from the one of a place;
   // returns how far [m] these are at the least.
@@ -81,13 +101,5 @@ class Grid {
   }
 
  private:
-  static constexpr double kSlack = 1e-9;
-  double cell_, low_[2] = {0, 0};
-  int64_t size_[2] = {0, 0};
   std::vector<int64_t> start_, order_;
-
-  int64_t index(double v, int k) const { return static_cast<int64_t>((v - low_[k]) / cell_); }
-  int64_t clip(double v, int k) const {
-    return static_cast<int64_t>(std::min(std::max(v, 0.0), static_cast<double>(size_[k] - 1)));
-  }
 };

@@ -27,6 +27,7 @@ class EvolvingMap {
       left_.push_back(enter(read(segments, i, weights.data()[i])));
       sightings_.push_back(left_.back());
     }
+    const nb::gil_scoped_release others_go_on;
     tree_.rebuild(left_);
   }
   EvolvingMap(const EvolvingMap& other)
@@ -57,10 +58,13 @@ class EvolvingMap {
     keep_left(settled);
   }
 
-  // Merges the cheapest pair again and again until none is cheap enough (VI).
-  void simplify() {
+  // Merges the cheapest pair again and again until none is cheap enough (VI); the first `settled`
+  // are merged among themselves.
+  void simplify(int64_t settled) {
+    const nb::gil_scoped_release others_go_on;
     const Pairing pairing = pairing_of(left_);
-    for (const int64_t number : left_) look_for_partner(number, pairing);
+    for (const int64_t number : left_)
+      if (number >= settled) look_for_partner(number, pairing);
     run(pairing);
     left_ = tree_.members();
   }
@@ -240,7 +244,7 @@ inline void bind_merging(nb::module_& m) {
   nb::class_<EvolvingMap>(m, "EvolvingMap")
       .def(nb::init<nb::handle, In<double, 2>, In<double, 1>>(), nb::arg("rules"), nb::arg("segments"), nb::arg("weights"))
       .def("merge_scan", &EvolvingMap::merge_scan, nb::arg("segments"), nb::arg("scan"))
-      .def("simplify", &EvolvingMap::simplify)
+      .def("simplify", &EvolvingMap::simplify, nb::arg("settled") = 0)
       .def("segments", &EvolvingMap::segments)
       .def("weights", &EvolvingMap::weights)
       .def("numbers", &EvolvingMap::numbers)

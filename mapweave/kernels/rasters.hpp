@@ -217,7 +217,12 @@ inline std::vector<uint8_t> fill(In<double, 2> corners, In<int64_t, 1> starts, I
 inline Out<uint8_t> filled_cells(In<double, 2> corners, In<int64_t, 1> starts, In<double, 1> origin, double cell,
                                  int64_t rows, int64_t columns) {
   const auto [r, c] = sides(rows, columns);
-  return give(fill(corners, starts, origin, cell, r, c), {static_cast<size_t>(r), static_cast<size_t>(c)});
+  std::vector<uint8_t> filled;
+  {
+    const nb::gil_scoped_release others_go_on;
+    filled = fill(corners, starts, origin, cell, r, c);
+  }
+  return give(std::move(filled), {static_cast<size_t>(r), static_cast<size_t>(c)});
 }
 
 // [m] from the edge of what is filled inwards; beyond the raster nothing is.

@@ -52,6 +52,7 @@ def evolve(
     segments: FloatArray,
     weights: FloatArray | None = None,
     parameters: MergingParameters | None = None,
+    settled: int = 0,
 ) -> Evolution:
     """Merge the cheapest pair again and again until none is cheap enough (simplification, VI).
 
@@ -63,6 +64,9 @@ def evolve(
         (n,) total length observed of each [m]; by default its length: seen once.
     parameters
         Which pairs are merged.
+    settled
+        How many of them, the first, are merged among themselves: only pairs with others are
+        looked at, and with what comes of these.
 
     Returns
     -------
@@ -71,7 +75,7 @@ def evolve(
     """
     mass = lengths(segments) if weights is None else weights
     evolving = evolving_map(segments, mass, parameters)
-    evolving.simplify()
+    evolving.simplify(settled)
     return _evolution(evolving)
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
-from mapweave.geometry.segments import sample
 from mapweave.kernels.lines.evidence import gather, near_pairs
+from mapweave.kernels.lines.sampling import sample_parts
 
 DIRECTION_BINS = 24  # of a full turn: sightings 15° apart are gathered
 
@@ -53,7 +53,7 @@ class Sightings:
         spacing
             [m] between samples at most.
         """
-        samples = sample(segments, spacing)
+        samples = sample_parts(segments, spacing)
         weights = np.asarray(counts[samples.owner] * samples.lengths, dtype=np.float64)
         return cls(samples.points, samples.directions, weights, spacing)
 

@@ -10,7 +10,8 @@ from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
 from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
-from mapweave.geometry.segments import sample, units
+from mapweave.geometry.segments import units
+from mapweave.kernels.lines.evidence import find_shared
 from mapweave.lines.collinear_junctions import StraighteningParameters, straighten
 from mapweave.lines.corner_junctions import JoiningParameters, join_corners
 from mapweave.lines.directions import main_directions
@@ -117,15 +118,9 @@ def sources(
         Those that the segments were simplified with: what was of a segment then is a sighting now.
     """
     p = parameters or SimplificationParameters()
-    points, directions, lengths, owner = sample(sightings, 2 * p.spacing)
-    near = Nearness.of(segments, points, directions, p.placement.tolerance)
-    along = np.flatnonzero(near.cosine >= np.cos(p.placement.parallel))
-    segment, source = near.segment[along], owner[near.sample[along]]
-    # Pairs come by segment, and then by sample: those of one sighting follow each other.
-    begins = np.append(True, (np.diff(segment) > 0) | (np.diff(source) > 0))[: len(segment)]
-    place = np.cumsum(begins) - 1
-    segment, source = segment[begins], source[begins]
-    shared = np.bincount(place, lengths[near.sample[along]], minlength=len(segment))
+    segment, source, shared, _ = find_shared(
+        segments, sightings, 2 * p.spacing, p.placement.tolerance, np.cos(p.placement.parallel)
+    )
     _, wall = units(segments)
     _, seen = units(sightings)
     enough = shared >= np.minimum(wall[segment], seen[source]) / 2
@@ -160,13 +155,10 @@ def unexplained(
 ) -> BoolArray:
     """Return (k,) which `sightings` (k, 4) [m] the `chosen` (n, 4) [m] explain too little of."""
     p = parameters
-    points, directions, lengths, owner = sample(sightings, 2 * p.spacing)
-    near = Nearness.of(chosen, points, directions, p.selection.tolerance)
-    known = np.zeros(len(points), dtype=np.bool_)
-    known[near.sample[explained(near, p.selection)]] = True
-    total = np.bincount(owner, lengths, minlength=len(sightings))
-    share = np.bincount(owner, lengths * known, minlength=len(sightings))
-    return np.asarray(share < p.missed * total)
+    *_, covered = find_shared(
+        chosen, sightings, 2 * p.spacing, p.selection.tolerance, p.selection.min_cosine
+    )
+    return np.asarray(covered < p.missed)
 
 
 def _trimmed(

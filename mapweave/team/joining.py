@@ -1,8 +1,9 @@
 """One component of a joint map: the walls of all that was joined, merged (paper, VI and VII)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -27,6 +28,9 @@ from mapweave.team.walls.segment_confidence import (
     Witness,
     segment_confidence,
 )
+
+A = TypeVar("A")
+B = TypeVar("B")
 
 STEPS = np.array(
     [2e-3, 2e-3, 2e-4]
@@ -96,6 +100,8 @@ class Placed:
         (3,) [m, m, rad].
     walls
         Its segments, merged; None of what was joined before.
+    middle
+        (2,) of these walls [m].
     seen
         Its lines as they are.
     joined
@@ -104,6 +110,7 @@ class Placed:
 
     pose: FloatArray
     walls: Walls | None
+    middle: FloatArray
     seen: LineMap
     joined: FloatArray | None
 
@@ -139,32 +146,37 @@ def join(
         )
         for name, frame in cluster.poses.items()
     )
-    # Gone through every time, so that what was merged is kept as well.
-    walls = [
-        [each.placed.walls for each in those if each.placed.walls is not None] for those in laid
-    ]
-    merged = _merged(walls, p, kept)
-    lines, sure = kept.joined.get(laid, lambda: _joined(laid, merged, p))
+    lines, sure = kept.joined.get(laid, lambda: _joined(laid, p, kept))
+    _merged(laid, p, kept)  # asked for every time, so that what was merged is kept as well
     return JointComponent(cluster.poses, cluster.confidence, lines, sure)
 
 
-def _joined(laid: Sequence[Sequence[Laid]], merged: FloatArray, p: JointParameters) -> Joined:
-    """Return the walls of all pieces, of which (n, 4) are left when `merged`."""
+def _joined(laid: Sequence[Sequence[Laid]], p: JointParameters, kept: Kept) -> Joined:
+    """Return the walls of all pieces; what was merged of them is `kept`."""
     together = [each.placed for those in laid for each in those]
     if len(together) == 1 and together[0].joined is not None:
         return together[0].seen, together[0].joined
+    merged, (free, free_space) = _both(
+        lambda: _merged(laid, p, kept), lambda: _free_space(together, p)
+    )
     seen = _seen(laid)
     stays = staying(seen, p.simplification)
     known, new = seen.those(stays), seen.those(~stays)
     again = new.segments[~np.isnan(new.sure)]
-    free = unite([ring for each in together for ring in each.seen.free_space], p.free_space)
     lines, order = _simplified(np.concatenate([merged, again]), known, new, free, p)
-    lines = replace(lines, free_space=_free_space(together, free, p))
+    lines = replace(lines, free_space=free_space)
     views = [
         [(each.witness, each.placed.pose) for each in those if each.witness is not None]
         for those in laid
     ]
     return lines, segment_confidence(lines, views, p.segments, _voices(known, order))
+
+
+def _both(first: Callable[[], A], second: Callable[[], B]) -> tuple[A, B]:
+    """Return what two make of nothing that is shared, the second in a thread of its own."""
+    with ThreadPoolExecutor(1) as beside:
+        other = beside.submit(second)
+        return first(), other.result()
 
 
 def _seen(laid: Sequence[Sequence[Laid]]) -> Seen:
@@ -186,14 +198,15 @@ def _seen(laid: Sequence[Sequence[Laid]]) -> Seen:
 
 
 def _free_space(
-    together: Sequence[Placed], free: BaseGeometry, p: JointParameters
-) -> tuple[FloatArray, ...]:
-    """Return the rings of all that is `free`: those of joint maps as they were."""
+    together: Sequence[Placed], p: JointParameters
+) -> tuple[BaseGeometry, tuple[FloatArray, ...]]:
+    """Return all that was seen through, and its rings: those of joint maps as they were."""
+    free = unite([ring for each in together for ring in each.seen.free_space], p.free_space)
     before = [ring for each in together if each.joined is not None for ring in each.seen.free_space]
     if not before:
-        return rings(free)
+        return free, rings(free)
     beyond = rings(free.difference(from_rings(before)))
-    return (*before, *rings(unite(beyond, p.free_space)))
+    return free, (*before, *rings(unite(beyond, p.free_space)))
 
 
 def _voices(known: Seen, order: IntArray) -> Voices:
@@ -207,7 +220,7 @@ def _placed(piece: Piece, frame: FloatArray, p: JointParameters, kept: Kept) -> 
     """Lay `piece` down in the component that is at `frame` (3,)."""
     if piece.joined is not None:
         pose = se2.compose(frame, piece.pose)
-        return Placed(pose, None, piece.lines.moved(pose), piece.joined)
+        return Placed(pose, None, pose[:2], piece.lines.moved(pose), piece.joined)
     steps = np.round(se2.compose(frame, piece.pose) / STEPS).astype(np.int64)
     key = piece.lines, tuple(steps.tolist())
     return kept.placed.get(key, lambda: _laid_down(piece.lines, steps * STEPS, p))
@@ -216,15 +229,19 @@ def _placed(piece: Piece, frame: FloatArray, p: JointParameters, kept: Kept) -> 
 def _laid_down(lines: LineMap, pose: FloatArray, p: JointParameters) -> Placed:
     moved = lines.moved(pose)
     merged = evolve(moved.segments, lengths(moved.segments) * lines.support, p.merging)
-    return Placed(pose, Walls(merged.segments, merged.weights), moved, None)
+    ends = moved.segments.reshape(-1, 2)
+    middle = ends.mean(axis=0) if len(ends) else pose[:2]
+    return Placed(pose, Walls(merged.segments, merged.weights), middle, moved, None)
 
 
-def _merged(walls: Sequence[Sequence[Walls]], p: JointParameters, kept: Kept) -> FloatArray:
-    """Return (n, 4) the walls of all pieces, of those of each component first (paper, VI)."""
-    each = [merge_all(those, p.merging, kept.mergings) for those in walls if those]
-    if not each:
+def _merged(laid: Sequence[Sequence[Laid]], p: JointParameters, kept: Kept) -> FloatArray:
+    """Return (n, 4) the walls of all pieces that were only mapped, merged (paper, VI)."""
+    mapped = [each.placed for those in laid for each in those if each.placed.walls is not None]
+    walls = [each.walls for each in mapped if each.walls is not None]
+    if not walls:
         return np.empty((0, 4))
-    return merge_all(each, p.merging, kept.mergings).segments
+    places = np.array([each.middle for each in mapped])
+    return merge_all(walls, places, p.merging, kept.mergings).segments
 
 
 def _simplified(

@@ -78,7 +78,8 @@ class JointMapBuilder:
         orders: Sequence[Order] = (),
         *,
         patient: bool = False,
-        is_overtaken: Callable[[], bool] | None = None,
+        is_awaited: bool = True,
+        is_overtaken: Callable[[], bool] = lambda: False,
     ) -> JointMap:
         """Return what the team knows, its robots' submaps woven together.
 
@@ -90,16 +91,18 @@ class JointMapBuilder:
         patient
             Whether all submaps are compared that are to be, however long that takes; if not, some
             of many wait for the next version.
+        is_awaited
+            Whether somebody waits for it: then few are compared. If not, it only goes on comparing.
         is_overtaken
-            Of a version that only goes on comparing, asked now and then: whether something has come
-            since. None of one that somebody waits for, for which few are compared.
+            Asked before walls are joined, which is most of the work, and of one that only compares
+            more all the time until then: whether to give it up for one that has more in it.
 
         Raises
         ------
         OvertakenError
             If it was; what was compared is kept.
         """
-        self._weaver.turn(patient=patient, is_overtaken=is_overtaken)
+        self._weaver.turn(patient=patient, is_awaited=is_awaited, is_overtaken=is_overtaken)
         for kept in (self._wholes, self._verdicts, self._edges):
             kept.turn()
         submaps = submaps_by_component(maps)
@@ -118,7 +121,7 @@ class JointMapBuilder:
         )
         marks = held_marks(maps)
         woven = [self._woven(cluster, submaps, judged) for cluster in clusters]
-        if is_overtaken is not None and is_overtaken():
+        if is_overtaken():
             raise OvertakenError
         for made in (self._witnesses, self._kept):
             made.turn()

@@ -8,15 +8,15 @@ bend by as much; which robots are joined, and how sure that is, was decided befo
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import FloatArray
-from mapweave.mapping.loops.loop_closing import LoopCloser, LoopParameters, middle_of_path
+from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
+from mapweave.kernels.lines.evidence import near_points
+from mapweave.mapping.loops.loop_closing import LoopCloser, LoopParameters
 from mapweave.mapping.loops.pose_graph import Constraint, optimise
 from mapweave.mapping.loops.submap_graph import joining_covariance, tracking_covariance
 from mapweave.maps import Alignment, LineMap, Submap, Trajectory
@@ -65,19 +65,58 @@ class JointOptimizationParameters(StageParameters):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Node:
-    """A submap of a component, at its pose (3,) in the cluster's frame, and its middle there."""
+class _Nodes:
+    """The n submaps of a cluster, component by component.
 
-    component: str
-    submap: Submap
-    middle: tuple[float, float]
+    Attributes
+    ----------
+    inside
+        Of each component of the cluster, by its name, where its submaps are among them.
+    submaps
+        As their robots have them.
+    component
+        (n,) the place of the component of each.
+    number
+        (n,) which submap of its robot each is.
+    middle
+        (n, 2) of its path, in its own frame [m].
+    """
+
+    inside: Mapping[str, range]
+    submaps: Sequence[Submap]
+    component: IntArray
+    number: IntArray
+    middle: FloatArray
 
     @classmethod
-    def of(cls, component: str, frame: FloatArray, submap: Submap) -> "_Node":
-        placed = replace(submap, pose=se2.compose(frame, submap.pose))
-        driven = len(submap.trajectory.pose) > 0
-        x, y = (middle_of_path(placed) if driven else placed.pose[:2]).tolist()
-        return cls(component, placed, (x, y))
+    def of(cls, cluster: Cluster, submaps: Mapping[str, Sequence[Submap]]) -> "_Nodes":
+        inside: dict[str, range] = {}
+        together: list[Submap] = []
+        for name in cluster.poses:
+            inside[name] = range(len(together), len(together) + len(submaps[name]))
+            together += submaps[name]
+        paths = [s.trajectory.pose[:, :2] for s in together]
+        middle = np.array([path.mean(axis=0) if len(path) else np.zeros(2) for path in paths])
+        component = np.repeat(np.arange(len(inside)), [len(those) for those in inside.values()])
+        return cls(inside, together, component, np.array([s.id for s in together]), middle)
+
+    def believed(self, component: str) -> FloatArray:
+        """(k, 3) poses of its submaps in a component, as their robot has them."""
+        return _believed([self.submaps[k] for k in self.inside[component]])
+
+    def laid(self, frames: Mapping[str, FloatArray]) -> FloatArray:
+        """(n, 3) poses in the cluster's frame, the components at their `frames` there."""
+        return np.vstack([se2.compose(frames[name], self.believed(name)) for name in self.inside])
+
+    def middles(self, poses: FloatArray) -> FloatArray:
+        """(n, 2) middles of their paths [m], the submaps at `poses` (n, 3)."""
+        unturned = np.column_stack([self.middle, np.zeros(len(self.middle))])
+        return se2.compose(poses, unturned)[:, :2]
+
+    def follow(self, first: IntArray, second: IntArray) -> BoolArray:
+        """(k,) which of pairs tracking links: the second was finished right after the first."""
+        same = self.component[first] == self.component[second]
+        return np.asarray(same & (self.number[second] == self.number[first] + 1))
 
 
 class _Compared(NamedTuple):
@@ -108,18 +147,23 @@ class JointOptimizer:
         self.turn()
 
     def turn(
-        self, *, patient: bool = False, is_overtaken: Callable[[], bool] | None = None
+        self,
+        *,
+        patient: bool = False,
+        is_awaited: bool = True,
+        is_overtaken: Callable[[], bool] = lambda: False,
     ) -> None:
         """Begin another version; one that is `patient` waits for all its comparisons.
 
         Parameters
         ----------
+        is_awaited
+            Whether somebody waits for it: then it makes few.
         is_overtaken
-            Of a version that nobody waits for, asked before each comparison: whether something has
-            come since. None where somebody waits.
+            If not, asked before each of them: whether something has come since.
         """
         self._tracks.turn()
-        self._patient, self._is_overtaken = patient, is_overtaken
+        self._patient, self._is_awaited, self._is_overtaken = patient, is_awaited, is_overtaken
         self._asked = self._made = 0
         self.has_more = False
 
@@ -140,46 +184,52 @@ class JointOptimizer:
         alignments
             As they were judged; the accepted ones of the cluster's components are relied on.
         """
-        nodes = [
-            _Node.of(name, pose, s) for name, pose in cluster.poses.items() for s in submaps[name]
-        ]
-        told = [*self._tracked(nodes), *self._aligned(nodes, cluster, alignments)]
-        before = fitted = np.array([n.submap.pose for n in nodes])
+        nodes = _Nodes.of(cluster, submaps)
+        before = fitted = nodes.laid(cluster.poses)
+        told = [*self._tracked(nodes), *self._aligned(nodes, fitted, cluster, alignments)]
         for _ in range(self._p.rounds):
-            closures = list(self._closures(_placed(nodes, fitted)))
+            closures = list(self._closures(nodes, fitted))
             if not closures and not _tell_bends(cluster, alignments):
-                return cluster, {name: _believed(submaps[name]) for name in cluster.poses}
+                return cluster, {name: nodes.believed(name) for name in cluster.poses}
             before, (fitted, _) = fitted, optimise(fitted, [*told, *closures])
             if np.hypot(*(fitted - before)[:, :2].T).max() < self._p.step:
                 break
         return _rooted(cluster, nodes, fitted)
 
-    def _tracked(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
+    def _tracked(self, nodes: _Nodes) -> Iterator[Constraint]:
         """Yield how each submap of a component lies to the one before, tracked or joined."""
-        for k, (one, other) in enumerate(pairwise(nodes)):
-            if one.component == other.component:
-                step = se2.between(one.submap.pose, other.submap.pose)
-                yield Constraint(k, k + 1, step, self._covariance(one, other, step), True)
+        for name, inside in nodes.inside.items():
+            poses = nodes.believed(name)
+            numbers = np.arange(inside.start, inside.stop)
+            follows = nodes.follow(numbers[:-1], numbers[1:])
+            steps = se2.between(poses[:-1], poses[1:])
+            for k, step, followed in zip(inside, steps, follows.tolist(), strict=False):
+                covariance = self._covariance(nodes.submaps[k].trajectory, step, tracked=followed)
+                yield Constraint(k, k + 1, step, covariance, True)
 
-    def _covariance(self, one: _Node, other: _Node, step: FloatArray) -> FloatArray:
+    def _covariance(self, path: Trajectory, step: FloatArray, *, tracked: bool) -> FloatArray:
         """(3, 3) of the `step` (3,) from a submap of a component to the next one in it."""
-        path, p = one.submap.trajectory, self._p.loops.graph
-        if not _follows(one, other):
+        p = self._p.loops.graph
+        if not tracked:
             return joining_covariance(p)
         return self._tracks.get((path, step.tobytes()), lambda: tracking_covariance(path, step, p))
 
     def _aligned(
-        self, nodes: Sequence[_Node], cluster: Cluster, alignments: Sequence[Alignment]
+        self,
+        nodes: _Nodes,
+        poses: FloatArray,
+        cluster: Cluster,
+        alignments: Sequence[Alignment],
     ) -> Iterator[Constraint]:
         """Yield how alignments lay submaps to each other: where they hold, if they tell.
 
         If not, those that are nearest, and loosely: where submaps themselves were found in each
         other, that says more.
         """
-        p, inside = self._p, _by_component(nodes)
+        p, inside = self._p, nodes.inside
         known = [a for a in alignments if a.decision == "accepted" and a.reference in inside]
         known = [a for a in known if a.other in inside]
-        held = [list(_held(a, nodes, inside)) for a in known]
+        held = [list(_held(a, nodes)) for a in known]
         exact = np.diag(np.array([p.place_sigma, p.place_sigma, p.place_turn]) ** 2)
         for i, j, step in (each for those in held for each in those):
             yield Constraint(i, j, step, exact, True)
@@ -189,8 +239,8 @@ class JointOptimizer:
         )
         if not relied:
             return
-        ends = [_nearest(nodes, inside[a.reference], inside[a.other]) for a in relied]
-        poses = np.array([n.submap.pose for n in nodes])
+        middles = nodes.middles(poses)
+        ends = [_nearest(middles, inside[a.reference], inside[a.other]) for a in relied]
         first, second = (
             se2.between(np.array([cluster.poses[n] for n in names]), poses[list(those)])
             for names, those in (
@@ -202,15 +252,15 @@ class JointOptimizer:
         for (i, j), step in zip(ends, se2.between(first, there), strict=True):
             yield Constraint(i, j, step, covariance, True)
 
-    def _closures(self, nodes: Sequence[_Node]) -> Iterator[Constraint]:
-        """Yield how submaps lie to each other that saw the same walls."""
+    def _closures(self, nodes: _Nodes, poses: FloatArray) -> Iterator[Constraint]:
+        """Yield how submaps at `poses` (n, 3) lie to each other that saw the same walls."""
         steps = np.array([self._p.step, self._p.step, self._p.turn_step])
-        pairs = list(self._candidates(nodes))
-        poses = np.array([n.submap.pose for n in nodes])
-        older, newer = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        older, newer = self._candidates(nodes, poses)
         between = np.round(se2.between(poses[older], poses[newer]) / steps).astype(np.int64)
-        for (first, second), about in zip(pairs, between.tolist(), strict=True):
-            asked = _Compared(nodes[first].submap.map, nodes[second].submap.map, *about)
+        for first, second, about in zip(
+            older.tolist(), newer.tolist(), between.tolist(), strict=True
+        ):
+            asked = _Compared(nodes.submaps[first].map, nodes.submaps[second].map, *about)
             link = self._link(asked)
             if link is not None:
                 yield Constraint(first, second, link.transform, link.covariance, link.trusted)
@@ -236,36 +286,32 @@ class JointOptimizer:
         """Whether further comparisons are for the next version."""
         if self._patient:
             return False
-        if self._is_overtaken is None:
+        if self._is_awaited:
             return self._made >= self._p.at_once
         return self._made >= self._p.beside or self._is_overtaken()
 
-    def _candidates(self, nodes: Sequence[_Node]) -> Iterator[tuple[int, int]]:
-        """Yield pairs of nodes near each other that tracking does not link."""
-        p = self._p
-        compared = [k for k in self._finished(nodes) if len(nodes[k].submap.map.segments)]
-        middles = np.array([nodes[k].middle for k in compared]).reshape(-1, 2)
-        for last, k in enumerate(compared):
-            apart = np.hypot(*(middles[:last] - middles[last]).T)
-            near: dict[str, list[tuple[float, int]]] = {}
-            for at in np.flatnonzero(apart < p.reach).tolist():
-                j = compared[at]
-                if not _is_tracked(nodes, j, k):
-                    near.setdefault(nodes[j].component, []).append((float(apart[at]), j))
-            nearest = sorted(
-                pair for those in near.values() for pair in sorted(those)[: p.candidates]
-            )
-            yield from ((j, k) for _, j in nearest[: p.most])
+    def _candidates(self, nodes: _Nodes, poses: FloatArray) -> tuple[IntArray, IntArray]:
+        """Return pairs of nodes near each other that tracking does not link, older and newer ones.
 
-    def _finished(self, nodes: Sequence[_Node]) -> list[int]:
-        """Return the nodes without the newest of each component, unless that is its only one."""
-        following = [n.component for n in nodes[1:]] + [None]
-        before = [None] + [n.component for n in nodes[:-1]]
-        return [
-            k
-            for k, node in enumerate(nodes)
-            if self._p.newest or node.component == following[k] or node.component != before[k]
-        ]
+        By the newer one, the nearest first.
+        """
+        p, compared = self._p, self._compared_at_all(nodes)
+        middles = nodes.middles(poses)[compared]
+        near = near_points(middles, middles, p.reach)
+        apart = np.hypot(*(middles[near[0]] - middles[near[1]]).T)
+        newer, older = compared[near[0]], compared[near[1]]
+        pairs = np.flatnonzero((older < newer) & (apart < p.reach) & ~nodes.follow(older, newer))
+        by_component = newer * len(nodes.inside) + nodes.component[older]
+        pairs = _nearest_of_each(pairs, by_component, apart, p.candidates)
+        pairs = _nearest_of_each(pairs, newer, apart, p.most)
+        return older[pairs], newer[pairs]
+
+    def _compared_at_all(self, nodes: _Nodes) -> IntArray:
+        """Return the nodes with walls, without the newest of each component that has others."""
+        edges = np.diff(nodes.component, prepend=-1, append=-1) != 0
+        first, last = edges[:-1], edges[1:]
+        walls = np.array([len(s.map.segments) > 0 for s in nodes.submaps], dtype=np.bool_)
+        return np.flatnonzero(walls & (first | ~last | self._p.newest))
 
     def _compared(self, asked: _Compared) -> Constraint | None:
         """Look for the newer of two submaps in the older one."""
@@ -276,14 +322,20 @@ class JointOptimizer:
         return self._loops.compare_two(older, newer, 0.0).link
 
 
-def _placed(nodes: Sequence[_Node], poses: FloatArray) -> list[_Node]:
-    """Return nodes at the (n, 3) `poses` in the cluster's frame."""
-    return [
-        node
-        if np.array_equal(node.submap.pose, pose)
-        else _Node.of(node.component, se2.IDENTITY, replace(node.submap, pose=pose))
-        for node, pose in zip(nodes, poses, strict=True)
-    ]
+def _nearest_of_each(pairs: IntArray, group: IntArray, apart: FloatArray, count: int) -> IntArray:
+    """Return of the `pairs` of each `group` the `count` least `apart`, group by group.
+
+    Parameters
+    ----------
+    pairs
+        (k,) indices, ascending where they are as far apart.
+    group, apart
+        (n,) of each pair there is.
+    """
+    pairs = pairs[np.lexsort((pairs, apart[pairs], group[pairs]))]
+    begins = np.flatnonzero(np.diff(group[pairs], prepend=-1))
+    rank = np.arange(len(pairs)) - np.repeat(begins, np.diff(begins, append=len(pairs)))
+    return pairs[rank < count]
 
 
 def _tell_bends(cluster: Cluster, alignments: Sequence[Alignment]) -> bool:
@@ -294,12 +346,10 @@ def _tell_bends(cluster: Cluster, alignments: Sequence[Alignment]) -> bool:
     )
 
 
-def _held(
-    alignment: Alignment, nodes: Sequence[_Node], inside: Mapping[str, Sequence[int]]
-) -> Iterator[tuple[int, int, FloatArray]]:
+def _held(alignment: Alignment, nodes: _Nodes) -> Iterator[tuple[int, int, FloatArray]]:
     """Yield the nodes that hold an alignment, and how they lie to each other there."""
     ours, theirs = (
-        {nodes[k].submap.id: k for k in inside[name]}
+        {nodes.submaps[k].id: k for k in nodes.inside[name]}
         for name in (alignment.reference, alignment.other)
     )
     for place in alignment.places:
@@ -312,34 +362,16 @@ def _believed(submaps: Sequence[Submap]) -> FloatArray:
     return np.array([s.pose for s in submaps]).reshape(-1, 3)
 
 
-def _follows(one: _Node, other: _Node) -> bool:
-    """Whether the second was finished right after the first."""
-    return other.submap.id == one.submap.id + 1
-
-
-def _is_tracked(nodes: Sequence[_Node], first: int, second: int) -> bool:
-    """Whether tracking links two nodes."""
-    one, other = nodes[first], nodes[second]
-    return one.component == other.component and _follows(one, other)
-
-
-def _by_component(nodes: Sequence[_Node]) -> dict[str, list[int]]:
-    inside: dict[str, list[int]] = {}
-    for k, node in enumerate(nodes):
-        inside.setdefault(node.component, []).append(k)
-    return inside
-
-
-def _nearest(nodes: Sequence[_Node], ours: Sequence[int], theirs: Sequence[int]) -> tuple[int, int]:
-    """Return the two, one of each, whose middles are nearest to each other."""
-    here, there = (np.array([nodes[k].middle for k in those]) for those in (ours, theirs))
+def _nearest(middles: FloatArray, ours: range, theirs: range) -> tuple[int, int]:
+    """Return the two, one of each, whose `middles` (n, 2) are nearest to each other."""
+    here, there = middles[ours], middles[theirs]
     apart = np.hypot(*(here[:, None] - there[None]).transpose(2, 0, 1))
     i, j = np.unravel_index(int(apart.argmin()), apart.shape)
     return ours[int(i)], theirs[int(j)]
 
 
 def _rooted(
-    cluster: Cluster, nodes: Sequence[_Node], fitted: FloatArray
+    cluster: Cluster, nodes: _Nodes, fitted: FloatArray
 ) -> tuple[Cluster, dict[str, FloatArray]]:
     """Return where components are as wholes, the first at the origin, and their submaps in them.
 
@@ -348,11 +380,9 @@ def _rooted(
     fitted
         (n, 3) where the nodes fit [m, m, rad].
     """
-    poses, own, by_component = {}, {}, _by_component(nodes)
-    for name, frame in cluster.poses.items():
-        inside = by_component[name]
-        before = se2.between(frame, np.array([nodes[k].submap.pose for k in inside]))
-        poses[name] = se2.fit(before, fitted[inside])
+    poses, own = {}, {}
+    for name, inside in nodes.inside.items():
+        poses[name] = se2.fit(nodes.believed(name), fitted[inside])
         own[name] = se2.between(poses[name], fitted[inside])
     first, root = next(iter(poses.items()))
     rooted = {name: se2.between(root, pose) for name, pose in poses.items()}

@@ -24,11 +24,13 @@ class Noting(Draft):
         builder: JointMapBuilder,
         *,
         patient: bool = False,
-        is_overtaken: Callable[[], bool] | None = None,
+        is_awaited: bool = True,
+        is_overtaken: Callable[[], bool] = lambda: False,
     ) -> JointMap:
         """Return a map of nothing."""
         assert not patient
-        assert is_overtaken is None
+        assert is_awaited
+        assert not is_overtaken()
         GIVEN.append(builder.parameters)
         return JointMap(self.version, (), ())
 

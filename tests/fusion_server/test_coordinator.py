@@ -178,12 +178,60 @@ def test_a_version_that_only_compares_what_was_left_is_overtaken_by_what_comes(
     coordinator.finish(JointMap(first.version, (), ()), has_more=True)
     coordinator.begin(7.0)
     assert not coordinator.is_awaited
-    assert not coordinator.has_more_to_tell()
+    assert not coordinator.is_overtaken()
     coordinator.receive_map(make_map("b"))
-    assert coordinator.has_more_to_tell()
+    assert coordinator.is_overtaken()
     coordinator.finish(None)
     assert coordinator.seconds_until_due(7.1) == 0.0
     assert _make_version(coordinator, now=7.1).version == 2
+
+
+def test_a_version_is_begun_anew_once_for_a_map_that_comes_meanwhile(make_map: MakeMap) -> None:
+    coordinator = _coordinator(min_interval=2.0)
+    coordinator.receive_map(make_map("a"))
+    coordinator.begin(0.0)
+    assert not coordinator.is_overtaken()
+    coordinator.receive_map(make_map("b"))
+    assert coordinator.is_overtaken()
+    coordinator.finish(None)
+    assert coordinator.seconds_until_due(0.5) == 0.0
+    anew = coordinator.begin(0.5)
+    assert len(anew.maps) == 2
+    coordinator.receive_map(make_map("c"))
+    assert not coordinator.is_overtaken()
+    coordinator.finish(JointMap(anew.version, (), ()))
+    assert coordinator.begin(3.0).version == anew.version + 1
+    coordinator.receive_map(make_map("d"))
+    assert coordinator.is_overtaken()
+
+
+def test_what_was_found_of_a_pair_does_not_overtake_a_version_that_is_awaited(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator()
+    a, b = make_map("a"), make_map("b")
+    coordinator.receive_map(a)
+    coordinator.receive_map(b)
+    coordinator.begin(0.0)
+    coordinator.receive_alignments(make_alignments(a, b))
+    assert coordinator.has_news
+    assert not coordinator.is_overtaken()
+
+
+def test_what_follows_a_version_that_was_given_up_is_as_urgent(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator(min_interval=2.0)
+    a, b = make_map("a"), make_map("b")
+    coordinator.receive_map(a)
+    coordinator.receive_map(b)
+    _make_version(coordinator, now=0.0)
+    coordinator.receive_alignments(make_alignments(a, b))
+    coordinator.begin(0.1)
+    coordinator.receive_map(make_map("c"))
+    assert coordinator.seconds_until_due(0.2) == math.inf
+    coordinator.finish(None)
+    assert coordinator.seconds_until_due(0.2) == 0.0
 
 
 def test_numbering_goes_on_after_a_restart(make_map: MakeMap) -> None:

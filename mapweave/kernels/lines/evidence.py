@@ -5,11 +5,13 @@ from typing import cast
 import numpy as np
 import scipy
 
+from mapweave.kernels.lines.sampling import sample_parts_numpy
 from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.point_map import Bools, Floats, Ints
 
 Near = tuple[Ints, Ints, Floats, Floats, Floats, Floats]
 Gathered = tuple[Floats, Floats, Floats]
+Shared = tuple[Ints, Ints, Floats, Floats]
 
 
 def near_pairs_numpy(segments: Floats, points: Floats, directions: Floats, reach: float) -> Near:
@@ -32,6 +34,25 @@ def near_pairs_numpy(segments: Floats, points: Floats, directions: Floats, reach
     cosine = (own[segment[near]] * directions[sample[near]]).sum(axis=1)
     distance = np.hypot(across, beyond)[near]
     return segment[near], sample[near], along[near], across[near], distance, cosine
+
+
+def find_shared_numpy(
+    segments: Floats, others: Floats, spacing: float, reach: float, least_cosine: float
+) -> Shared:
+    """Twin of `find_shared`."""
+    points, directions, lengths, owner = sample_parts_numpy(others, spacing)
+    segment, sample, *_, cosine = near_pairs_numpy(segments, points, directions, reach)
+    segment, sample = segment[cosine >= least_cosine], sample[cosine >= least_cosine]
+    pairs, place = np.unique(np.column_stack([segment, owner[sample]]), axis=0, return_inverse=True)
+    shared = np.bincount(place.ravel(), lengths[sample], len(pairs)).astype(np.float64)
+    known = np.zeros(len(points), dtype=np.bool_)
+    known[sample] = True
+    total, covered = (
+        np.bincount(owner, weights, minlength=len(others)) for weights in (lengths, lengths * known)
+    )
+    share = np.divide(covered, total, out=np.ones(len(others)), where=total > 0)
+    first, second = pairs.T.astype(np.int64)
+    return first, second, shared, np.asarray(share)
 
 
 def take_greedily_numpy(
@@ -96,6 +117,49 @@ def near_pairs(segments: Floats, points: Floats, directions: Floats, reach: floa
     """
     compute = near_pairs_numpy if COMPILED is None else COMPILED.near_pairs
     return cast("Near", compute(segments, points, directions, reach))
+
+
+def find_shared(
+    segments: Floats, others: Floats, spacing: float, reach: float, least_cosine: float
+) -> Shared:
+    """Return how much of each of `others` lies along each of `segments`, pair by pair.
+
+    Parameters
+    ----------
+    segments, others
+        (n, 4) and (m, 4) x1 y1 x2 y2 [m], the same frame.
+    spacing
+        [m] between the places of the others that are looked at, at most.
+    reach
+        [m] within which such a place lies along a segment…
+    least_cosine
+        …if that of the angle between both is no less.
+
+    Returns
+    -------
+    segment, other
+        (k,) indices of each pair that shares anything, ascending.
+    shared
+        (k,) of the other, along the segment [m].
+    covered
+        (m,) the share of each of the others that lies along any segment, in [0, 1].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not finite.
+    """
+    compute = find_shared_numpy if COMPILED is None else COMPILED.find_shared
+    return cast(
+        "Shared",
+        compute(
+            np.ascontiguousarray(segments),
+            np.ascontiguousarray(others),
+            spacing,
+            reach,
+            least_cosine,
+        ),
+    )
 
 
 def near_points(first: Floats, second: Floats, reach: float) -> tuple[Ints, Ints]:

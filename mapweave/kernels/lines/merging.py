@@ -65,10 +65,13 @@ class NumpyEvolvingMap:
             self._look_for_partner(number, pairing)
         self._run(pairing)
 
-    def simplify(self) -> None:
-        """Merge the cheapest pair again and again until none is cheap enough (VI)."""
+    def simplify(self, settled: int = 0) -> None:
+        """Merge the cheapest pair again and again until none is cheap enough (VI).
+
+        The first `settled` are merged among themselves: they wait to be found by others.
+        """
         pairing = self._pairing(self._left)
-        for number in self._left.tolist():
+        for number in self._left[self._left >= settled].tolist():
             self._look_for_partner(number, pairing)
         self._run(pairing)
 

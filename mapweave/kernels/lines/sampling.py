@@ -8,6 +8,25 @@ from mapweave.kernels.arrays import FloatArray, IntArray
 from mapweave.kernels.loading import COMPILED
 
 
+class PartSamples(NamedTuple):
+    """Points in the middle of equal parts of segments, segment by segment.
+
+    Attributes
+    ----------
+    points, directions
+        (n, 2) [m], and unit vectors along the segment; zero where that has no length.
+    lengths
+        (n,) how much of it each stands for [m].
+    owner
+        (n,) its index.
+    """
+
+    points: FloatArray
+    directions: FloatArray
+    lengths: FloatArray
+    owner: IntArray
+
+
 class LineSamples(NamedTuple):
     """Samples, line by line.
 
@@ -52,3 +71,29 @@ def sample_lines(segments: FloatArray, spacing: float) -> LineSamples:
     if COMPILED is None:
         return sample_lines_numpy(segments, spacing)
     return LineSamples(*COMPILED.sample_lines(np.ascontiguousarray(segments), spacing))
+
+
+def sample_parts_numpy(segments: FloatArray, spacing: float) -> PartSamples:
+    """Twin of `sample_parts`."""
+    along = segments[:, 2:] - segments[:, :2]
+    length = np.hypot(along[:, 0], along[:, 1])
+    directions = along / np.maximum(length, 1e-12)[:, None]
+    counts = np.maximum(1, np.ceil(length / spacing)).astype(np.int64)
+    owner = np.repeat(np.arange(len(segments)), counts)
+    rank = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = (length / counts)[owner]
+    points = segments[owner, :2] + ((rank + 0.5) * part)[:, None] * directions[owner]
+    return PartSamples(points, directions[owner], part, owner)
+
+
+def sample_parts(segments: FloatArray, spacing: float) -> PartSamples:
+    """Return the middles of equal parts, `spacing` [m] long at most, of (k, 4) `segments` [m].
+
+    Raises
+    ------
+    ValueError
+        Where segments have no end or samples are too many, compiled.
+    """
+    if COMPILED is None:
+        return sample_parts_numpy(segments, spacing)
+    return PartSamples(*COMPILED.sample_parts(np.ascontiguousarray(segments), spacing))

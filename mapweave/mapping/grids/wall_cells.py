@@ -10,8 +10,9 @@ import numpy as np
 import scipy
 
 from mapweave.geometry.arrays import BoolArray, FloatArray
-from mapweave.geometry.segments import sample, units
+from mapweave.geometry.segments import units
 from mapweave.kernels.lines.evidence import take_greedily
+from mapweave.kernels.lines.sampling import sample_parts
 from mapweave.lines.sightings import Nearness
 
 ACROSS = 2**0.5  # [cells] of a cell: what is farther from its middle is more than a cell off it
@@ -42,7 +43,7 @@ class WallCells:
 
         Those as long as `MIN_CELLS` cells, or longer.
         """
-        points, directions, length, owner = sample(segments, self.resolution / STATIONS)
+        points, directions, length, owner = sample_parts(segments, self.resolution / STATIONS)
         apart, _ = scipy.spatial.KDTree(self.middles).query(points)
         near = np.flatnonzero(apart <= (ACROSS - 0.5 / STATIONS) * self.resolution)
         runs = np.split(near, 1 + np.flatnonzero((np.diff(near) > 1) | (np.diff(owner[near]) > 0)))

@@ -1,5 +1,6 @@
 """How sure each segment of a joint map is: by the scans that saw it, and the robots' vote."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -138,16 +139,31 @@ def _heard(
 ) -> Iterator[tuple[IntArray, NDArray[np.uint8]]]:
     """Yield which of (n, 2) `points` each piece knows of, and what it says of each.
 
-    All at once: there are hundreds of pieces, of few points each.
+    There are hundreds of pieces, of few points each: only those beside it are looked at.
     """
-    back = se2.inverse(np.array([pose for _, pose in pieces]))
-    origin = np.array([witness.origin for witness, _ in pieces])
-    cell = np.array([[witness.cell] for witness, _ in pieces])
-    rows, columns = np.array([witness.shape for witness, _ in pieces]).T[:, :, None]
-    (x, y), (c, s) = points.T, (np.cos(back[:, 2:]), np.sin(back[:, 2:]))
-    i = (x * c - y * s + (back[:, :1] - origin[:, :1])) / cell
-    j = (x * s + y * c + (back[:, 1:2] - origin[:, 1:])) / cell
-    inside = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
-    for k, (witness, _) in enumerate(pieces):
-        known = np.flatnonzero(inside[k])
-        yield known, witness.at(i[k, known].astype(np.int64), j[k, known].astype(np.int64))
+    order = np.argsort(points[:, 0])
+    x, y = points[order].T
+    low, high = np.array([_bounds(witness, pose) for witness, pose in pieces]).T
+    begins, ends = (np.searchsorted(x, bound).tolist() for bound in (low, high))
+    back = se2.inverse(np.array([pose for _, pose in pieces])).tolist()
+    for (witness, _), (dx, dy, turn), begin, end in zip(pieces, back, begins, ends, strict=True):
+        c, s = math.cos(turn), math.sin(turn)
+        (left, bottom), (rows, columns) = witness.origin.tolist(), witness.shape
+        here, up = x[begin:end], y[begin:end]
+        i = (here * c - up * s + (dx - left)) / witness.cell
+        j = (here * s + up * c + (dy - bottom)) / witness.cell
+        known = np.flatnonzero((i >= 0) & (j >= 0) & (i < rows) & (j < columns))
+        said = witness.at(i[known].astype(np.int64), j[known].astype(np.int64))
+        yield order[begin:end][known], said
+
+
+def _bounds(witness: Witness, pose: FloatArray) -> tuple[float, float]:
+    """Return between which x [m] a piece at `pose` (3,) knows anything."""
+    (x, _, turn), (left, bottom), (rows, columns) = pose, witness.origin, witness.shape
+    c, s = math.cos(turn), math.sin(turn)
+    first = x + c * left - s * bottom
+    run, rise = c * witness.cell * rows, -s * witness.cell * columns
+    return (
+        first + min(run, 0.0) + min(rise, 0.0) - witness.cell,
+        first + max(run, 0.0) + max(rise, 0.0) + witness.cell,
+    )

@@ -1,8 +1,8 @@
-"""Lengths, directions and samples of segments."""
+"""Lengths and directions of segments."""
 
 import numpy as np
 
-from mapweave.geometry.segments import cross, lengths, near_intervals, sample, units
+from mapweave.geometry.segments import cross, lengths, near_intervals, units
 
 SEGMENTS = np.array([[0.0, 0, 3, 4], [1, 1, 1, 1], [2, 0, 2, -1]])
 
@@ -19,13 +19,6 @@ def test_a_direction_is_a_unit_vector_and_nothing_where_there_is_no_length() -> 
 
 def test_a_cross_product_is_the_sine_to_the_left() -> None:
     assert cross(np.array([[1.0, 0], [1, 0]]), np.array([[0.0, 2], [0, -2]])).tolist() == [2, -2]
-
-
-def test_samples_stand_for_equal_parts_that_add_up_to_the_segment() -> None:
-    found = sample(SEGMENTS[[0, 2]], spacing=2.0)
-    assert found.owner.tolist() == [0, 0, 0, 1]
-    np.testing.assert_allclose(found.lengths, [5 / 3] * 3 + [1])
-    np.testing.assert_allclose(found.points[1], [1.5, 2])
 
 
 def test_a_segment_of_hardly_any_length_is_within_reach_or_is_not() -> None:

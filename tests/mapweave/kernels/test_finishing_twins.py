@@ -55,6 +55,26 @@ def test_segments_find_the_same_points_near_them(
 
 
 @settings(max_examples=40, deadline=None)
+@given(seeds, counts, counts, st.sampled_from([0.05, 0.3, 3.0]), st.sampled_from([-1.0, 0.9]))
+def test_segments_share_as_much_with_others(
+    seed: int, count: int, others: int, reach: float, least_cosine: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    asked = some_segments(rng, count), some_segments(rng, others), 0.1, reach, least_cosine
+    same(evidence.find_shared(*asked), evidence.find_shared_numpy(*asked))
+
+
+def test_of_a_segment_that_lies_along_two_half_each_all_is_covered() -> None:
+    halves = np.array([[0.0, 0, 2, 0], [2, 0, 4, 0], [0, 5, 4, 5]])
+    segment, other, shared, covered = evidence.find_shared(
+        halves, np.array([[0.0, 0.01, 4, 0.01], [0, 3, 1, 3]]), 0.5, 0.05, 0.9
+    )
+    assert segment.tolist() == [0, 1] and other.tolist() == [0, 0]
+    np.testing.assert_allclose(shared, [2, 2])
+    np.testing.assert_allclose(covered, [1, 0])
+
+
+@settings(max_examples=40, deadline=None)
 @given(seeds, counts, counts)
 def test_the_same_segments_are_taken(seed: int, count: int, samples: int) -> None:
     rng = np.random.default_rng(seed)
@@ -161,6 +181,7 @@ ONE, PLACES = np.ones(1, dtype=np.int64), np.zeros((1, 2))
     [
         lambda: evidence.near_pairs(np.zeros((1, 4)), np.zeros((2, 2)), np.zeros((1, 2)), 1.0),
         lambda: evidence.near_pairs(np.full((1, 4), np.nan), PLACES, PLACES, 1.0),
+        lambda: evidence.find_shared(np.full((1, 4), np.nan), np.ones((1, 4)), 1.0, 1.0, 0.0),
         lambda: evidence.take_greedily(1, ONE, ONE, ONE == 1, np.ones(1), 0.0),
         lambda: evidence.gather(np.zeros((1, 2)), np.zeros((2, 2)), np.ones(1), 1.0, 4),
         lambda: multiview.solve_positive(np.zeros((2, 2)), np.zeros(2)),

@@ -18,7 +18,12 @@ from mapweave.kernels.lines.main_directions import (
 )
 from mapweave.kernels.lines.merging import NumpyEvolvingMap
 from mapweave.kernels.lines.polylines import numpy_group_polylines
-from mapweave.kernels.lines.sampling import sample_lines, sample_lines_numpy
+from mapweave.kernels.lines.sampling import (
+    sample_lines,
+    sample_lines_numpy,
+    sample_parts,
+    sample_parts_numpy,
+)
 from mapweave.kernels.lines.slivers import numpy_sliver_owners
 from mapweave.kernels.loading import COMPILED
 from mapweave.lines.merging import MergingParameters
@@ -58,16 +63,16 @@ def assert_same(one: Any, other: NumpyEvolvingMap) -> None:  # noqa: ANN401
 
 
 @settings(max_examples=60, deadline=None)
-@given(seeds, sizes, st.sampled_from(PARAMETERS))
+@given(seeds, sizes, st.sampled_from([0.0, 0.5, 1.0]), st.sampled_from(PARAMETERS))
 def test_the_same_segments_evolve_into_the_same(
-    seed: int, count: int, parameters: MergingParameters
+    seed: int, count: int, settled: float, parameters: MergingParameters
 ) -> None:
     rng = np.random.default_rng(seed)
     segments, weights = walls_seen(rng, count), rng.uniform(0.1, 100.0, count)
     one = compiled("EvolvingMap")(parameters.rules, segments, weights)
     other = NumpyEvolvingMap(parameters.rules, segments, weights)
-    one.simplify()
-    other.simplify()
+    one.simplify(int(settled * count))
+    other.simplify(int(settled * count))
     assert_same(one, other)
 
 
@@ -232,6 +237,26 @@ def test_lines_have_the_same_samples(seed: int, count: int, spacing: float) -> N
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
+@settings(max_examples=40, deadline=None)
+@given(seeds, sizes, st.sampled_from([0.07, 0.5, 20.0]))
+def test_parts_of_lines_have_the_same_middles(seed: int, count: int, spacing: float) -> None:
+    walls = walls_seen(np.random.default_rng(seed), count)
+    found = sample_parts(walls, spacing), sample_parts_numpy(walls, spacing)
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+def test_samples_stand_for_equal_parts_that_add_up_to_the_line() -> None:
+    lines = np.array([[0.0, 0, 3, 4], [2, 0, 2, -1], [1, 1, 1, 1]])
+    found = sample_parts(lines, 2.0)
+    assert found.owner.tolist() == [0, 0, 0, 1, 2]
+    np.testing.assert_allclose(found.lengths, [5 / 3] * 3 + [1, 0])
+    np.testing.assert_allclose(found.points[1], [1.5, 2])
+    np.testing.assert_array_equal(found.directions[3:], [[0, -1], [0, 0]])
+
+
 def test_lines_that_are_not_finite_are_refused() -> None:
     with pytest.raises(ValueError, match="finite"):
         sample_lines(np.full((1, 4), np.nan), 0.1)
+    with pytest.raises(ValueError, match="finite"):
+        sample_parts(np.array([[0.0, 0, np.inf, 0]]), 0.1)

@@ -8,7 +8,8 @@ from numpy.random import Generator
 
 from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
-from mapweave.geometry.segments import sample, units
+from mapweave.geometry.segments import units
+from mapweave.kernels.lines.sampling import sample_parts
 from mapweave.lines.sightings import Nearness, Sightings
 from tests.mapweave.buildings import random_pose
 
@@ -28,7 +29,7 @@ def test_the_weights_are_the_wall_seen_as_often_as_it_was_seen(rng: Generator) -
 
 def test_samples_lie_on_their_segment_in_equal_steps_its_ends_included(rng: Generator) -> None:
     segments = some_segments(rng, 20)
-    points, directions, parts, owner = sample(segments, 0.25)
+    points, directions, parts, owner = sample_parts(segments, 0.25)
     for number, segment in enumerate(segments):
         own = owner == number
         along = (points[own] - segment[:2]) @ directions[own][0]

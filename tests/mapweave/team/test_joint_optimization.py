@@ -193,16 +193,16 @@ def test_a_version_that_nobody_waits_for_compares_more_until_something_comes(
 ) -> None:
     cluster, robots, alignments = team(BENT, frames)
 
-    def turns(is_overtaken: Callable[[], bool] | None) -> int:
+    def turns(is_overtaken: Callable[[], bool], *, is_awaited: bool = False) -> int:
         few = JointOptimizationParameters(newest=True, at_once=2, beside=1_000_000)
         weaver, count = JointOptimizer(few), 0
         while not count or (weaver.has_more and count < 4):
-            weaver.turn(is_overtaken=is_overtaken)
+            weaver.turn(is_awaited=is_awaited, is_overtaken=is_overtaken)
             weaver.weave(cluster, robots, alignments)
             count += 1
         return count
 
-    assert turns(None) == 4
+    assert turns(lambda: False, is_awaited=True) == 4
     assert turns(lambda: False) == 1
     assert turns(lambda: True) == 4
 
