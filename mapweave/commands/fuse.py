@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations, product
 from pathlib import Path
 
@@ -75,8 +75,34 @@ def _read_distinct(paths: list[Path]) -> list[RobotMap | JointMap]:
                 " one an id of its own, as with mapweave map --robot r2",
             )
         robots |= _robots(some_map)
+        _check_no_part(path, some_map, dict(zip(paths, maps, strict=False)))
         maps.append(some_map)
     return maps
+
+
+def _check_no_part(
+    path: Path, some_map: RobotMap | JointMap, others: Mapping[Path, RobotMap | JointMap]
+) -> None:
+    """Refuse what one of `others` goes on from, or that goes on from it: one drive, told twice."""
+    own = _drives(some_map)
+    for before, other in others.items():
+        if not own.isdisjoint(_drives(other)):
+            raise FileError(
+                path,
+                f"has submaps of {before} as they are, as of --continue; expected the one of the"
+                " two that has all: together they would count walls twice",
+            )
+
+
+def _drives(some_map: RobotMap | JointMap) -> set[bytes]:
+    """Return what tells a submap apart that is the same to the last digit: its walls, and when."""
+    if not isinstance(some_map, RobotMap) or path_followed(some_map) is not None:
+        return set()
+    return {
+        submap.map.segments.tobytes() + submap.trajectory.stamp.tobytes()
+        for submap in some_map.submaps
+        if len(submap.map.segments)
+    }
 
 
 def _robots(some_map: RobotMap | JointMap) -> set[str]:

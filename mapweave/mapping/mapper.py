@@ -85,7 +85,7 @@ class Mapper:
         What the map says that it was made with, unless other parameters are given.
     live
         Whether no scan may wait for the backend: where that is late, finished submaps queue for
-        it, and its outcome is adopted later.
+        it, and its outcome is adopted later. Poses are wanted at once: as `prompt`.
     prompt
         Whether what takes long is done at once: else the scans that come meanwhile wait, so that
         none takes much longer than others; the map is the same.
@@ -141,7 +141,7 @@ class Mapper:
         self._origin: FloatArray = se2.IDENTITY  # of the tracker's frame in the component's
         self._frame: FloatArray = se2.IDENTITY  # of the growing submap in the tracker's frame
         backend = backend or Backend(self.parameters.backend, self._finished)
-        self._prompt = prompt
+        self._prompt = prompt or live
         self._unsettled = SettlingQueue(backend, live=live)
         self._draw = draw
         self._follows = False  # whether the growing submap was tracked from the last finished one

@@ -80,6 +80,16 @@ def test_a_log_is_mapped_on_from_a_stored_map_under_its_robots_name(
                 assert np.hypot(*apart[:2]) < 0.1
 
 
+def test_a_map_and_the_one_that_goes_on_from_it_are_no_two_witnesses(
+    log: Path, first: Path, tmp_path: Path
+) -> None:
+    output = tmp_path / "all.json"
+    words = ["map", log, "--scans", "40:", "--robot", "r8", "--continue", first]
+    assert main_here(*words, "--output", output).returncode == 0
+    done = main_here("fuse", first, output)
+    assert_fails_in_one_line(done, output, f"has submaps of {first} as they are")
+
+
 def test_a_log_is_followed_in_a_stored_map_that_stays_as_it_is(
     log: Path, first: Path, tmp_path: Path
 ) -> None:
