@@ -8,6 +8,8 @@ from mapweave.geometry.arrays import BoolArray, FloatArray, IntArray
 from mapweave.kernels.clearing import Sights
 from mapweave.scan.scan import Scan
 
+GRAZING = 0.2  # cosine between a beam and a surface's normal, below which it tells little
+
 
 def clear_ranges(scan: Scan, max_range: float) -> FloatArray:
     """Return (beams,) how far [m] each beam and both its neighbours saw nothing.
@@ -50,6 +52,36 @@ def seen_through(
     before: BoolArray = np.hypot(points[:, 0], points[:, 1]) < clear[beam] - margin
     through: BoolArray = inside & before
     return through
+
+
+def beams_through(
+    scan: Scan, points: FloatArray, normals: FloatArray, margin: float, max_range: float
+) -> int:
+    """Return how many beams of `scan` go through known surfaces and end on none of them.
+
+    A beam that ends on one is where it should be: what it went through has gone. Surfaces behind
+    what a beam hit, beside all beams, or seen from behind tell nothing.
+
+    Parameters
+    ----------
+    scan
+        One sweep.
+    points, normals
+        (n, 2) known surfaces [m], and unit vectors to the side that was seen, sensor frame.
+    margin
+        [m] across a surface, by which a beam that ends on one may be off, and one that goes
+        through must be.
+    max_range
+        [m] beyond which no surface counts.
+    """
+    distance = np.hypot(points[:, 0], points[:, 1])
+    beam, inside = _beams(scan, np.arctan2(points[:, 1], points[:, 0]))
+    facing = -np.einsum("ij,ij->i", points, normals) / np.maximum(distance, 1e-9)
+    shown = inside & (distance < max_range) & (facing > GRAZING)
+    beam, distance, facing = beam[shown], distance[shown], facing[shown]
+    ends = np.abs(scan.ranges[beam] - distance) * facing < margin
+    through = (clear_ranges(scan, max_range)[beam] - distance) * facing > margin
+    return len(np.setdiff1d(beam[through], beam[ends]))
 
 
 def beam_spacing(scan: Scan) -> float:

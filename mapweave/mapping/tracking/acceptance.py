@@ -5,7 +5,7 @@ as well. A robot that was carried off sees look-alikes within reach: these are d
 leap to get to.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,6 +58,13 @@ class AcceptanceParameters(BaseModel):
     held: float = Field(
         2.5, gt=0, description="points that hold a pose in every direction, after a miss"
     )
+    max_denied: float = Field(
+        0.13,
+        ge=0,
+        le=1,
+        description="share of the returns of which walls deny a pose, after a miss; it is more at"
+        " one in a hundred of the right poses, in whatever building, and at half of the wrong ones",
+    )
     expected: float = Field(0.02, ge=0, description="surprise up to which a pose is expected")
     expected_dispute: float = Field(0.15, ge=0, description="disputed share of one, at most")
     undisputed: float = Field(0.05, ge=0, description="disputed share of one, after a miss")
@@ -108,21 +115,27 @@ def is_credible(tracked: ScanMatch, parameters: AcceptanceParameters) -> bool:
 
 
 def tell_apart(
-    found: Sequence[ScanMatch], novelty: float, parameters: AcceptanceParameters
+    found: Sequence[ScanMatch],
+    novelty: float,
+    parameters: AcceptanceParameters,
+    denied: Callable[[ScanMatch], float],
 ) -> list[ScanMatch]:
     """Return the poses that count after a miss, where the best can be told from look-alikes.
 
     None where a different pose of those `found` is worth more than the best of them: along bare
-    walls many are as good, and the one that is held is so by chance.
+    walls many are as good, and the one that is held is so by chance. Nor where walls
+    deny the best one: a room fits itself, turned by a quarter.
 
     Parameters
     ----------
     novelty
         What a return at a new place counts.
+    denied
+        Tells of what share of its returns walls deny that the scan was taken there.
     """
     again = [tracked for tracked in found if _is_found_again(tracked, parameters)]
     best = max(again, key=lambda t: t.value(novelty), default=None)
-    if best is None:
+    if best is None or denied(best) > parameters.max_denied:
         return []
     rivals = _rivals(best, found, parameters)
     outdone = any(t.value(novelty) > best.value(novelty) for t in rivals)
@@ -218,10 +231,20 @@ def is_turned_blindly(best: ScanMatch, turn: float, parameters: AcceptanceParame
     return abs(turn) > np.pi / 2 and not _is_held(best, parameters)
 
 
-def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) -> ScanMatch | None:
+def best_by_sight(
+    found: Sequence[ScanMatch],
+    parameters: AcceptanceParameters,
+    denied: Callable[[ScanMatch], float],
+) -> ScanMatch | None:
     """Return the best of the poses `found` by what was seen and nothing else, if that tells.
 
-    Not where another pose is worth as much: a look-alike; nor where something is left open.
+    Not where another pose is worth as much: a look-alike; nor where something is left open, or
+    walls deny it.
+
+    Parameters
+    ----------
+    denied
+        As `tell_apart` has it.
     """
     p = parameters
 
@@ -229,7 +252,7 @@ def best_by_sight(found: Sequence[ScanMatch], parameters: AcceptanceParameters) 
         return tracked.evidence.score + p.novelty * tracked.evidence.novel
 
     best = max(found, key=worth)
-    if best.evidence.score < p.acceptable or not _is_held(best, p):
+    if best.evidence.score < p.acceptable or not _is_held(best, p) or denied(best) > p.max_denied:
         return None
     alike = (t for t in found if worth(t) > worth(best) - p.lead)
     return None if any(is_rival(best, t, p) for t in alike) else best

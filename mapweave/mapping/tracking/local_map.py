@@ -5,6 +5,7 @@ and known surfaces that the new scan sees through, speak against it.
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ from mapweave.matching.icp import CELL, IcpParameters, Target
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.points import OrientedPoints, join_points
 from mapweave.scan.scan import Scan
-from mapweave.scan.visibility import beam_spacing, clear_ranges
+from mapweave.scan.visibility import beam_spacing, beams_through, clear_ranges
 
 
 class LocalMapParameters(StageParameters):
@@ -133,6 +134,7 @@ class LocalMap:
         self._viewpoints = make_viewpoints(p.keyframes)
         self._settings = evidence_settings(_settings(p))
         self._things = StandingThings(p.things)
+        self._solid: deque[OrientedPoints] = deque(maxlen=p.keyframes)
         self._last: FloatArray | None = None
         self._raster: LikelihoodField | None = None
         self._asked: tuple[Scan, tuple[FloatArray, float, float]] | None = None
@@ -141,7 +143,7 @@ class LocalMap:
         """Return one that remembers by itself from now on."""
         other = LocalMap(self._parameters)
         other._known, other._viewpoints = self._known.copy(), self._viewpoints.copy()
-        other._things = self._things.copy()
+        other._things, other._solid = self._things.copy(), self._solid.copy()
         other._last, other._raster = self._last, self._raster
         return other
 
@@ -176,6 +178,7 @@ class LocalMap:
         loose: BoolArray,
         pose: FloatArray,
         *,
+        spared: bool,
         held: bool,
     ) -> None:
         """Add a scan taken at `pose` (3,), unless it was taken about where the last one was.
@@ -185,14 +188,18 @@ class LocalMap:
         oriented
             Its oriented points, sensor frame.
         loose
-            (n,) which of them are on things that may move, and are not needed as landmarks.
+            (n,) which of them are on things that may move.
+        spared
+            Whether these are not needed as landmarks.
         held
             Whether the pose is held in every direction: from elsewhere nobody knows what moved.
         """
         if not self._is_news(pose):
             return
-        placed = self._landmarks(scan, oriented.moved(pose), loose, pose, held=held)
-        self._known.add(placed.points, placed.normals)
+        placed = oriented.moved(pose)
+        landmarks = self._landmarks(scan, placed, loose & spared, pose, held=held)
+        self._known.add(landmarks.points, landmarks.normals)
+        self._solid.append(placed.at(np.flatnonzero(~loose)))
         self._viewpoints.add(*self._view(scan), pose)
         self._last, self._raster = pose, None
 
@@ -268,6 +275,16 @@ class LocalMap:
                 counts.tolist(), through.tolist(), strict=True
             )
         ]
+
+    def looked_through(self, scan: Scan, pose: FloatArray) -> int:
+        """Return how many beams of `scan` at `pose` (3,) go through what cannot move.
+
+        All of these should have ended before. Of the surfaces near, of which `seen_through` is a
+        share, most are behind a robot that turned, or behind walls.
+        """
+        p = self._parameters
+        solid = join_points(list(self._solid)).moved(se2.inverse(pose))
+        return beams_through(scan, solid.points, solid.normals, p.clearance, p.far_sight)
 
     def _view(self, scan: Scan) -> tuple[FloatArray, float, float]:
         """Return how far each beam saw nothing [m], the first one's angle, their spacing [rad].

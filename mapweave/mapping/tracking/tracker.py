@@ -192,7 +192,8 @@ class Tracker:
         wide = min(max(reach, self.parameters.local_map.search.reach), self.parameters.widest)
         relied = self._relied_on(seen, near)
         starts = self._local.search(relied.oriented.points, near, np.pi, wide)
-        return best_by_sight(self._aligned(relied, np.vstack([near, starts])), p)
+        found = self._aligned(relied, np.vstack([near, starts]))
+        return best_by_sight(found, p, lambda t: self._denied(relied, t))
 
     def _state(self) -> _State:
         """Return how it is now, to come back to."""
@@ -215,11 +216,15 @@ class Tracker:
         self._odometry = seen.scan.odometry
         self.pose = tracked.pose
         self._reachability.placed(seen.scan, tracked.pose)
-        loose, held = (
-            seen.loose & self._spares_things(seen),
-            not is_open(tracked, self.parameters.acceptance),
+        held = not is_open(tracked, self.parameters.acceptance)
+        self._local.remember(
+            seen.scan,
+            seen.walls,
+            seen.loose,
+            tracked.pose,
+            spared=self._spares_things(seen),
+            held=held,
         )
-        self._local.remember(seen.scan, seen.walls, loose, tracked.pose, held=held)
         self._untried = [each for each in reversed(self.missed) if not self.is_blind(each)]
         self.missed = []
         return [(seen, tracked)]
@@ -275,7 +280,7 @@ class Tracker:
         found: list[ScanMatch] = []
         for starts in likely_first:
             found += self._reached(seen, starts())
-            best = self._best(found, a.novelty)
+            best = self._best(seen, found, a.novelty)
             if best is not None and best.evidence.score >= a.convincing and is_credible(best, a):
                 best = self._slid(seen, best, found)
                 if is_unremarkable(best, self._turn_to(best), a):
@@ -288,12 +293,12 @@ class Tracker:
     def _best_of_all(self, seen: Observation, found: list[ScanMatch]) -> ScanMatch | None:
         """Return the best of all within reach, if it is believed and no look-alike."""
         a = self.parameters.acceptance
-        best = self._best(found, a.novelty)
+        best = self._best(seen, found, a.novelty)
         if best is None:
             return None
         if best.evidence.score >= a.acceptable and is_credible(best, a):
             best = self._slid(seen, best, found)
-        elif not is_acceptable(best, self._likely(found, a.novelty), a):
+        elif not is_acceptable(best, self._likely(seen, found, a.novelty), a):
             return None
         return (
             None
@@ -314,18 +319,30 @@ class Tracker:
         """Return the best along the direction that is left open, if one is; add it to `found`."""
         slides = self._slides(seen, best)
         found += slides
-        return self._best([best, *slides], self.parameters.open_novelty) or best
+        return self._best(seen, [best, *slides], self.parameters.open_novelty) or best
 
-    def _likely(self, found: list[ScanMatch], novelty: float) -> list[ScanMatch]:
+    def _likely(self, seen: Observation, found: list[ScanMatch], novelty: float) -> list[ScanMatch]:
         """Those that count: after a miss, where the best can be told from look-alikes."""
-        return tell_apart(found, novelty, self.parameters.acceptance) if self.missed else found
+        if not self.missed:
+            return found
+        a = self.parameters.acceptance
+        return tell_apart(found, novelty, a, lambda t: self._denied(seen, t))
 
-    def _best(self, found: list[ScanMatch], novelty: float) -> ScanMatch | None:
+    def _denied(self, seen: Observation, tracked: ScanMatch) -> float:
+        """Return of what share of its returns walls deny that `seen` was taken there.
+
+        They are behind a known wall, or on what cannot have come since.
+        """
+        through = self._local.looked_through(seen.scan, tracked.pose)
+        evidence = tracked.evidence
+        return evidence.contradicted - evidence.excused + through / len(seen.oriented)
+
+    def _best(self, seen: Observation, found: list[ScanMatch], novelty: float) -> ScanMatch | None:
         """The one worth most of those that count, the first of equals; None where none does.
 
         Many starts end within a millimetre of each other: rounding must not choose.
         """
-        likely = [(t.value(novelty), t) for t in self._likely(found, novelty)]
+        likely = [(t.value(novelty), t) for t in self._likely(seen, found, novelty)]
         most = max((value for value, _ in likely), default=0.0)
         return next((t for value, t in likely if value >= most - EQUAL), None)
 

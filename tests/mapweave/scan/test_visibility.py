@@ -5,8 +5,9 @@ import pytest
 from numpy.random import Generator
 
 from mapweave.geometry import se2
+from mapweave.geometry.arrays import FloatArray
 from mapweave.scan.scan import Scan
-from mapweave.scan.visibility import clear_ranges, seen_through
+from mapweave.scan.visibility import beams_through, clear_ranges, seen_through
 from tests.mapweave.buildings import AROUND, FRONT, cast, random_pose, rectangle, walls_of
 
 # The sensor stands at (1, 2) in a room 6 m by 4 m and looks along x: the wall ahead is 5 m away.
@@ -86,3 +87,39 @@ def test_what_is_seen_through_does_not_depend_on_where_the_world_is(rng: Generat
     here = seen_through(cast(ROOM, pose), points, 0.3, 20.0)
     there = cast(se2.transform_segments(moved, ROOM), se2.compose(moved, pose))
     np.testing.assert_array_equal(here, seen_through(there, points, 0.3, 20.0))
+
+
+def _surface(start: tuple[float, float], end: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Points every 5 cm on a surface that shows its left side, in the frame of the sensor."""
+    a, b = np.array(start), np.array(end)
+    count = int(np.hypot(*(b - a)) / 0.05)
+    along = (b - a) / np.hypot(*(b - a))
+    points = a + np.linspace(0, 1, count)[:, None] * (b - a)
+    return points, np.tile([-along[1], along[0]], (count, 1))
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "through"),
+    [((5, -1), (5, 1), False),  # the wall that is seen
+     ((4, -1), (4, 1), True),
+     ((4, 1), (4, -1), False),  # seen from behind
+     ((4.5, 0.3), (2, 0.3), False),  # along the beams
+     ((8, -1), (8, 1), False),  # behind what was hit
+     ((-0.5, 1), (-0.5, -1), False)],  # beside all beams
+)  # fmt: skip
+def test_beams_go_through_a_known_wall_that_they_should_end_on(
+    start: tuple[float, float], end: tuple[float, float], through: bool
+) -> None:
+    count = beams_through(SCAN, *_surface(start, end), 0.3, 20.0)
+    assert count > 10 if through else count == 0
+
+
+def test_what_a_beam_goes_through_to_end_on_a_known_wall_has_gone() -> None:
+    wall, left = _surface((5, -1), (5, 1)), _surface((4, -0.5), (4, 0.5))
+    points, normals = (np.concatenate(each) for each in zip(wall, left, strict=True))
+    assert beams_through(SCAN, *left, 0.3, 20.0) > 10
+    assert beams_through(SCAN, points, normals, 0.3, 20.0) == 0
+
+
+def test_beams_prove_nothing_about_walls_far_away() -> None:
+    assert beams_through(SCAN, *_surface((4, -1), (4, 1)), 0.3, 3.0) == 0

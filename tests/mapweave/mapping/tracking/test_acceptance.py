@@ -34,28 +34,41 @@ def pose(
     return ScanMatch(np.array([x, 0.0, turn]), evidence, information)
 
 
+def undenied(_: ScanMatch) -> float:
+    """Of no return do walls deny that it was seen from there."""
+    return 0.0
+
+
 def test_a_pose_that_is_held_and_explains_most_counts() -> None:
     best, other = pose(0.5, 0.8), pose(1.5, 0.3, 0.2)
-    assert tell_apart([other, best], P.novelty, P) == [best]
+    assert tell_apart([other, best], P.novelty, P, undenied) == [best]
 
 
 def test_what_one_may_slide_along_or_explains_too_little_does_not_count() -> None:
-    assert tell_apart([pose(0.5, 0.9, information=OPEN)], P.novelty, P) == []
-    assert tell_apart([pose(0.5, 0.55, 0.3)], P.novelty, P) == []
-    assert tell_apart([], P.novelty, P) == []
+    assert tell_apart([pose(0.5, 0.9, information=OPEN)], P.novelty, P, undenied) == []
+    assert tell_apart([pose(0.5, 0.55, 0.3)], P.novelty, P, undenied) == []
+    assert tell_apart([], P.novelty, P, undenied) == []
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0])
 def test_nothing_counts_where_a_different_pose_is_worth_more(turn: float) -> None:
     """In a bare corridor many fit; the one that a door frame holds is so by chance."""
     held, better = pose(0.5, 0.7), pose(1.5 - turn, 0.8, turn=turn, information=OPEN)
-    assert tell_apart([held], P.novelty, P) == [held]
-    assert tell_apart([held, better], P.novelty, P) == []
+    assert tell_apart([held], P.novelty, P, undenied) == [held]
+    assert tell_apart([held, better], P.novelty, P, undenied) == []
+
+
+def test_nothing_counts_where_walls_deny_the_best() -> None:
+    """Turned by a quarter a room fits itself, but what the robot left is not as it was."""
+    best, other = pose(0.5, 0.8), pose(1.5, 0.6)
+    assert tell_apart([best, other], P.novelty, P, lambda at: 0.1 * (at is best)) == [best, other]
+    assert tell_apart([best, other], P.novelty, P, lambda at: 0.4 * (at is best)) == []
+    assert tell_apart([best, other], P.novelty, P, lambda at: 0.4 * (at is other)) == [best, other]
 
 
 def test_a_pose_next_to_the_best_is_not_different() -> None:
     best, near = pose(0.5, 0.7), pose(0.7, 0.75, information=OPEN)
-    assert tell_apart([best, near], P.novelty, P) == [best]
+    assert tell_apart([best, near], P.novelty, P, undenied) == [best]
 
 
 def disputed_leap(leap: float, information: FloatArray) -> ScanMatch:
@@ -123,8 +136,9 @@ def test_what_may_have_come_since_does_not_hide_where_the_robot_is() -> None:
     """Half of what is seen are people: of the rest nearly all is explained."""
     people, boxes = ScanEvidence(0.48, 0.5, 0.0, 0.48), ScanEvidence(0.48, 0.5, 0.0)
     among, blocked = (ScanMatch(np.zeros(3), each, HELD) for each in (people, boxes))
-    assert is_acceptable(among, [among], P) and tell_apart([among], P.novelty, P) == [among]
-    assert not is_acceptable(blocked, [blocked], P) and tell_apart([blocked], P.novelty, P) == []
+    assert is_acceptable(among, [among], P) and not is_acceptable(blocked, [blocked], P)
+    assert tell_apart([among], P.novelty, P, undenied) == [among]
+    assert tell_apart([blocked], P.novelty, P, undenied) == []
     elsewhere = ScanMatch(np.array([2.0, 0.0, 0.0]), people, HELD)
     assert not is_acceptable(among, [among, elsewhere], P)
 
@@ -150,13 +164,19 @@ def test_half_a_turn_is_another_pose_in_a_corridor_too() -> None:
 
 def test_a_scan_that_was_missed_is_not_placed_where_two_places_are_alike() -> None:
     best, other, along = pose(0.0, 0.8), pose(3.0, 0.78), pose(3.0, 0.6)
-    assert best_by_sight([along, best], P) is best
-    assert best_by_sight([best, other], P) is None
-    assert best_by_sight([pose(0.0, 0.3, 0.1)], P) is None
+    assert best_by_sight([along, best], P, undenied) is best
+    assert best_by_sight([best, other], P, undenied) is None
+    assert best_by_sight([pose(0.0, 0.3, 0.1)], P, undenied) is None
+
+
+def test_a_scan_that_was_missed_is_not_placed_where_walls_deny_it() -> None:
+    best = pose(0.0, 0.8)
+    assert best_by_sight([best], P, lambda _: 0.1) is best
+    assert best_by_sight([best], P, lambda _: 0.2) is None
 
 
 def test_a_scan_that_was_missed_is_not_placed_where_a_direction_is_open() -> None:
-    assert best_by_sight([pose(0.0, 0.9, information=ALONG_Y)], P) is None
+    assert best_by_sight([pose(0.0, 0.9, information=ALONG_Y)], P, undenied) is None
 
 
 def test_along_bare_walls_nobody_turns_round_unseen() -> None:
