@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mapweave.errors import ID_IN_WORDS
-from mapweave.ids import ID_PATTERN
 from mapweave.reasons import Pair, Reason, ReasonKind, Status, StatusKind
 
 if TYPE_CHECKING:
@@ -74,7 +72,6 @@ def in_words(problem: "ErrorDetails") -> str:
     said = problem["msg"].removeprefix("Value error, ")
     if problem["type"] == "json_invalid":
         return f"is no JSON, or is cut off (at {said.rpartition(' at ')[2]})"
-    said = said.replace(f"String should match pattern '{ID_PATTERN}'", f"expected {ID_IN_WORDS}")
     whole = {"missing": "is missing", "extra_forbidden": "no such field"}.get(problem["type"])
     return whole or re.sub("^Input should be ", "expected ", said)
 

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from mapweave.atomic import replace_file
-from mapweave.errors import FileError
+from mapweave.errors import ID_IN_WORDS, FileError
 from mapweave.evidence import RunnerUp
 from mapweave.geometry.arguments import check_kind
 from mapweave.geometry.arrays import FloatArray
+from mapweave.ids import ID_PATTERN
 from mapweave.io.annotations import listed, mark_content, order_content, placed_mark_content
 from mapweave.io.map_schema import JOINT_FORMAT, MAP_FORMAT, HeaderFile, JointFile, MapFile
 from mapweave.io.readers.streams import DamagedStreamError, UnusableArchiveError, read_blocks
@@ -37,6 +38,7 @@ from mapweave.reasons import Reason, Status
 from mapweave.scan.coverage import coverage
 from mapweave.text import in_words
 
+_NO_ID = f"String should match pattern '{ID_PATTERN}'"  # as the library says it that checks
 _EXPECTED = f"expected a map file ({MAP_FORMAT} or {JOINT_FORMAT})"
 METRES, _RADIANS, _SECONDS, _RATIOS = 4, 6, 6, 6
 """Decimals that are written of each kind of number."""
@@ -181,7 +183,7 @@ def _check(path: Path, content: bytes, model: type[_File]) -> _File:
 def _first_problem(error: ValidationError) -> str:
     """Return where the first problem is, what it is and what was found: ``submaps[0].pose: …``."""
     problem = error.errors(include_url=False, include_context=False)[0]
-    message = in_words(problem)
+    message = in_words(problem).replace(_NO_ID, f"expected {ID_IN_WORDS}")
     found = problem["input"]
     if isinstance(found, str | float | int) and problem["loc"]:
         message += f", found {reprlib.repr(found)}"

@@ -84,8 +84,8 @@ def test_a_map_and_the_one_that_goes_on_from_it_are_no_two_witnesses(
     log: Path, first: Path, tmp_path: Path
 ) -> None:
     output = tmp_path / "all.json"
-    words = ["map", log, "--scans", "40:", "--robot", "r8", "--continue", first]
-    assert main_here(*words, "--output", output).returncode == 0
+    words = ("--scans", "40:", "--robot", "r8", "--continue", first, "--output", output)
+    assert main_here("map", log, *words).returncode == 0
     done = main_here("fuse", first, output)
     assert_fails_in_one_line(done, output, f"has submaps of {first} as they are")
 
