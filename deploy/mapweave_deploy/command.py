@@ -104,6 +104,7 @@ def _run_in(
             try:
                 outcome = run_team(crew, plan, display)
             except (KeyboardInterrupt, MapweaveError):
+                _hear_no_more()
                 crew.stop(lowest_stage=SERVER)  # it stores what is pending
                 _say(console, _keep_so_far(plan, options.store, made_with, folder))
                 raise
@@ -116,6 +117,12 @@ def _run_in(
             _stay(crew, plan, console)
     if outcome.lost:
         raise LostRobotsError(outcome.lost, folder.logs)
+
+
+def _hear_no_more() -> None:
+    """Let the word to end, which shells tell twice, not take away what is being kept."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _keep_so_far(
