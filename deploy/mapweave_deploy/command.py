@@ -104,9 +104,9 @@ def _run_in(
             try:
                 outcome = run_team(crew, plan, display)
             except (KeyboardInterrupt, MapweaveError):
-                _hear_no_more()
-                crew.stop(lowest_stage=SERVER)  # it stores what is pending
-                _say(console, _keep_so_far(plan, options.store, made_with, folder))
+                with _undisturbed():
+                    crew.stop(lowest_stage=SERVER)  # it stores what is pending
+                    _say(console, _keep_so_far(plan, options.store, made_with, folder))
                 raise
         store = _keep_store(plan.store, options.store or folder.store)
         staying = options.stay or (plan.page is not None and _is_attended(console))
@@ -119,10 +119,16 @@ def _run_in(
         raise LostRobotsError(outcome.lost, folder.logs)
 
 
-def _hear_no_more() -> None:
-    """Let the word to end, which shells tell twice, not take away what is being kept."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let the word to end, which shells tell twice, not take away what a block keeps."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def _keep_so_far(

@@ -380,8 +380,8 @@ def test_a_missing_field_is_named(content: dict[str, Any], steps: Steps, tmp_pat
     ("content", "steps", "value", "place", "expected"),
     [
         (MAP, ["format"], "mapweave/map/2", "format", "'mapweave/map/1'"),
-        (MAP, ["robot"], "R 1", "robot", "pattern"),
-        (MAP, ["robot"], "r1\n", "robot", "pattern"),
+        (MAP, ["robot"], "R 1", "robot", "expected 1 to 32 characters"),
+        (MAP, ["robot"], "r1\n", "robot", "expected 1 to 32 characters"),
         (MAP, ["version"], -1, "version", "greater than or equal to 0"),
         (MAP, ["version"], "17", "version", "valid integer"),
         (MAP, ["submaps"], {}, "submaps", "valid array"),
