@@ -123,7 +123,7 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
 
 def say(options: argparse.Namespace, content: object, lines: Iterable[str]) -> None:
     """Print `content` as a line of JSON where ``--json`` asks for it, and `lines` otherwise."""
-    for line in [json.dumps(content)] if options.json else lines:
+    for line in [json.dumps(content, allow_nan=False)] if options.json else lines:
         print(line, flush=True)  # noqa: T201
 
 

@@ -24,7 +24,7 @@ def _run(options: argparse.Namespace) -> int:
     check_export_suffix(options.output)
     with busy(f"writing {options.output.name}"):
         export(load(options.map), options.output)
-    say(options, {"output": str(options.output), "bytes": options.output.stat().st_size}, [])
+    say(options, {"output": str(options.output)}, [])
     return 0
 
 

@@ -86,12 +86,16 @@ def _check_no_part(
     """Refuse what one of `others` goes on from, or that goes on from it: one drive, told twice."""
     own = _drives(some_map)
     for before, other in others.items():
-        if not own.isdisjoint(_drives(other)):
-            raise FileError(
-                path,
-                f"has submaps of {before} as they are, as of --continue; expected the one of the"
-                " two that has all: together they would count walls twice",
-            )
+        theirs = _drives(other)
+        if own.isdisjoint(theirs):
+            continue
+        wanted = "maps of drives of their own"
+        if own <= theirs or own >= theirs:
+            wanted = f"only the one that has more, {path if len(own) > len(theirs) else before}"
+        raise FileError(
+            path,
+            f"has submaps of {before} as they are, which would count twice; expected {wanted}",
+        )
 
 
 def _drives(some_map: RobotMap | JointMap) -> set[bytes]:

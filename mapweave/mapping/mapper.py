@@ -252,11 +252,12 @@ class Mapper:
         Return whether it is placed, and whether the robot was lost. What takes long is done alone.
         """
         self._again.append(scan)
-        late = self._is_late
+        many = len(self._waiting) + len(self._again) > LATE
+        late = many or self._prompt
         if self._try_missed() and not late:
             return False, False
         placed = lost = False
-        left = AGAIN if late else AT_ONCE
+        left = AGAIN if many else AT_ONCE
         while left > 0 and (self._waiting or self._again):
             index, found, was_lost = self._go_on()
             placed, lost = found and index == scan.index, lost or was_lost
@@ -264,11 +265,6 @@ class Mapper:
             if self._tracker.searched and not late:
                 break
         return placed, lost
-
-    @property
-    def _is_late(self) -> bool:
-        """Whether scans are placed whatever that takes."""
-        return self._prompt or len(self._waiting) + len(self._again) > LATE
 
     def _try_missed(self) -> bool:
         """Try some of the scans that were missed before the robot was found again, if any were."""
@@ -392,7 +388,7 @@ class Mapper:
         self._follows = False
         self._tracker = self._tracker.afresh()
         self._loss = Loss(self.parameters.patience)
-        self._deskewer = Deskewer()
+        self._deskewer = self._deskewer.afresh()
         self._origin = self._frame = se2.IDENTITY
 
     def _merge(self, seen: Observation, tracked: ScanMatch) -> None:

@@ -2,7 +2,8 @@
 
 A driver that stamps what it receives, over a link that hands scans on some at a time, stamps ten of
 them within milliseconds and then none for a second. So the time that a scan usually takes is the
-median of those from one to the next, unless many together take far longer than that tells.
+median of those from one to the next, unless that is less than lidars take, and many together take
+far longer than it tells. A pause, or a clock that is set, is one gap, and not a batch.
 """
 
 import math
@@ -15,8 +16,11 @@ from mapweave.scan.scan import Scan
 
 REMEMBERED = 60  # intervals between scans, whose median is the usual one
 FEW = 10  # of them: as long as there are less, the longest is
+QUICK = 0.02  # [s] from one scan to the next: few lidars are as quick, batches are
+BATCHED = 6.0  # times the median, that a gap between batches takes
+GAPS = 3  # or more, among those remembered: fewer are pauses
 RUNS = (4, 8, 16)  # scans together, of which a batch may be a part
-BATCHED = 6.0  # times the median, that a scan takes in such a run: recordings come to 4.9
+JITTER = 0.5  # of the usual time, by which stamps of a lidar that spins evenly err
 SHORTEST = 0.005  # [s] a scan: no lidar spins two hundred times a second
 
 
@@ -27,10 +31,13 @@ class ScanClock:
     ----------
     interval
         The time [s] that a scan usually takes; None where stamps do not tell.
+    is_batched
+        Whether scans come in batches.
     """
 
     def __init__(self) -> None:
         self.interval: float | None = None
+        self.is_batched = False
         self._intervals: deque[float] = deque(maxlen=REMEMBERED)
         self._last: tuple[int, float] | None = None
 
@@ -44,6 +51,7 @@ class ScanClock:
         """Return one that knows how long scans take, and of no scan."""
         other = type(self)()
         other._intervals, other.interval = self._intervals.copy(), self.interval
+        other.is_batched = self.is_batched
         return other
 
     def tick(self, scan: Scan) -> None:
@@ -68,12 +76,27 @@ class ScanClock:
         told = abs(scan.stamp - stamp)
         return max(counted, told) if math.isfinite(told) else counted
 
+    def until(self, scan: Scan, last: Scan) -> float:
+        """Return how long [s] it took from the `last` scan to `scan`, at best; 0 if nothing tells.
+
+        A lidar spins evenly: by what its stamps jitter, they err.
+        """
+        told = scan.stamp - last.stamp
+        if self.interval is None:
+            return 0.0
+        counted = max(scan.index - last.index, 1) * self.interval
+        is_even = self.is_batched or abs(told - counted) <= JITTER * self.interval
+        return counted if is_even else max(told, 0.0)
+
     def _usual(self) -> float:
         count = len(self._intervals)
         if count < FEW:
             return max(self._intervals)
         usual = median(self._intervals)
+        gaps = sum(each > BATCHED * max(usual, 0.0) for each in self._intervals)
+        self.is_batched = usual < QUICK and gaps >= GAPS
+        if not self.is_batched:
+            return usual
         run = max(run for run in RUNS if 2 * run <= count)
         passed = [0.0, *accumulate(self._intervals)]
-        mean = median(b - a for a, b in zip(passed, passed[run:], strict=False)) / run
-        return mean if mean > BATCHED * max(usual, 0.0) else usual
+        return median(b - a for a, b in zip(passed, passed[run:], strict=False)) / run

@@ -62,7 +62,7 @@ def is_grid(path: Path) -> bool:
 
 def check_no_picture(path: Path) -> None:
     """Raise FileError if `path` is the picture of such a grid, and not its settings."""
-    if path.suffix.lower() not in PICTURES:
+    if path.suffix.lower() not in PICTURES or not path.exists():
         return
     beside = [path.with_suffix(suffix) for suffix in SUFFIXES]
     there = next((str(settings) for settings in beside if settings.exists()), "its .yaml")

@@ -16,15 +16,15 @@ class Stamps:
         self._onwards = 0
         self._back = 0
         self._last = math.nan
-        self._first = math.nan
+        self._passed = 0.0
 
     def add(self, stamp: float) -> None:
         """Count one more scan, taken at `stamp` [s]; NaN where it is not known."""
         self._scans += 1
         self._onwards += stamp > self._last
         self._back += stamp < self._last
+        self._passed += max(stamp - self._last, 0.0) if stamp > self._last else 0.0
         self._last = self._last if math.isnan(stamp) else stamp
-        self._first = stamp if math.isnan(self._first) else self._first
 
     @property
     def assumed(self) -> str:
@@ -41,8 +41,7 @@ class Stamps:
 
     def _too_fast(self) -> str:
         """What is assumed where they are those of no lidar, as when a whole log is sent at once."""
-        passed = self._last - self._first
-        if passed / self._scans >= SHORTEST:
+        if self._passed / self._scans >= SHORTEST:
             return ""
-        told = f"{self._scans} stamps within {passed:.3g} s"
+        told = f"{self._scans} stamps within {self._passed:.3g} s"
         return f"scans follow each other evenly, as no lidar takes {told}; expected seconds"

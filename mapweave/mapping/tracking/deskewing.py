@@ -10,6 +10,7 @@ pose, and the next velocity by twice as much: poses swing from scan to scan.
 """
 
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -39,10 +40,17 @@ class Deskewer:
         self._told: tuple[Scan, FloatArray] | None = None  # the same of odometry
         self.to_stamp: FloatArray = np.zeros(3)
 
+    def afresh(self) -> Self:
+        """Return one that knows how long scans take, and of none where it was."""
+        other = type(self)()
+        other._clock = self._clock.afresh()
+        return other
+
     def placed(self, scan: Scan, pose: FloatArray) -> None:
         """Take in that `scan`, as it was straightened, was placed at `pose` (3,) [m, m, rad]."""
         if self._placed is not None:
-            self._velocity = self._between(*self._placed, scan, pose)
+            last, before = self._placed
+            self._velocity = _velocity(before, pose, self._clock.until(scan, last))
         self._placed = scan, pose
 
     def straight(self, scan: Scan) -> Scan:
@@ -65,15 +73,13 @@ class Deskewer:
             self._told = None
             return None
         self._told = scan, scan.odometry
-        return None if before is None else self._between(*before, scan, scan.odometry)
-
-    def _between(self, last: Scan, first: FloatArray, scan: Scan, second: FloatArray) -> FloatArray:
-        """(3,) [m/s, m/s, rad/s] in the frame of `second` (3,); zero where the stamps tell none."""
-        since = self._clock.since(last.index, last.stamp, scan)
-        if self._clock.interval is None or since > LONGEST:
-            return np.zeros(3)
-        # Seen from the second pose, which is where the robot is now.
-        return -se2.between(second, first) / since
+        if before is None:
+            return None
+        last, pose = before
+        # It is of the stamps, however these jitter.
+        batched = self._clock.is_batched
+        since = self._clock.until(scan, last) if batched else scan.stamp - last.stamp
+        return _velocity(pose, scan.odometry, since)
 
 
 def deskewed(scan: Scan, velocity: FloatArray) -> Scan:
@@ -120,3 +126,11 @@ def _resampled(angles: FloatArray, directions: FloatArray, distances: FloatArray
     found = np.where(one_surface, near + share * (far - near), nearest)
     apart = np.minimum(np.abs(angles - low), np.abs(high - angles))
     return np.where(apart <= step, found, np.nan)
+
+
+def _velocity(first: FloatArray, second: FloatArray, since: float) -> FloatArray:
+    """(3,) [m/s, m/s, rad/s] in the frame of `second` (3,); zero where no time [s] is told."""
+    if not 0.0 < since <= LONGEST:
+        return np.zeros(3)
+    # Seen from the second pose, which is where the robot is now.
+    return -se2.between(second, first) / since

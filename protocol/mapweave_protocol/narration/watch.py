@@ -61,6 +61,7 @@ from mapweave_protocol.wire.messages import (
 from mapweave_protocol.wire.model import Message
 from mapweave_protocol.wire.queries import JointQuery
 
+MAX_LINE = 2000  # characters shown of what is told
 KEPT_LINES = 20  # of the story stay on the terminal
 POLL = 0.5  # [s]
 ASKED_EVERY = 1.0  # [s] between two questions for a version that was missed, at the least
@@ -258,7 +259,7 @@ def _run_live(console: Console, watcher: Watcher, story: Iterator[str | None]) -
 
 def _run_plain(options: argparse.Namespace, story: Iterator[str | None]) -> None:
     for line in filter(None, story):
-        say(options, {"time": time.time(), "line": line}, [_stamped(line)])
+        say(options, {"time": time.time(), "line": line}, [_stamped(shown(line, MAX_LINE))])
 
 
 def _stamped(line: str) -> str:

@@ -235,7 +235,8 @@ def test_stamps_that_tell_no_time_stay_and_what_is_assumed_is_said(
 
 
 @pytest.mark.parametrize(
-    "stamps", [[1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 5], [1, 2, 3, 9, 1, 2, 3, 4, 5, 6, 7], [7, 7, 7],
+    "stamps", [[*range(60), *range(-900, -860)],
+               [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 5], [1, 2, 3, 9, 1, 2, 3, 4, 5, 6, 7], [7, 7, 7],
                [1, "nan", 2, "nan", "nan", 3, 3, 3, 3, 3, 4], [1]]
 )  # fmt: skip
 def test_stamps_some_of_which_repeat_or_run_back_are_no_matter(

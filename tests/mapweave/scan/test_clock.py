@@ -57,3 +57,23 @@ def test_a_copy_goes_on_by_itself_and_one_afresh_knows_the_interval() -> None:
     afresh = clock.afresh()
     afresh.tick(scan(900, 5000.0))
     assert clock.interval == other.interval == afresh.interval == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("at", [3, 12, 20, 45])
+@pytest.mark.parametrize("second", [0, 30])
+def test_pauses_are_no_batches(at: int, second: int) -> None:
+    stamps = 0.1 * np.arange(120)
+    stamps[at:] += 60.0
+    if second:
+        stamps[at + second :] += 15.0
+    told = [ticked(stamps[:count].tolist()).interval for count in range(12, 120)]
+    assert all(interval == pytest.approx(0.1) for interval in told)
+
+
+def test_steps_are_told_by_the_usual_time_where_stamps_jitter_and_by_these_after_a_pause() -> None:
+    clock = ticked([0.1 * k for k in range(30)])
+    assert clock.until(scan(30, 2.93), scan(29, 2.9)) == pytest.approx(0.03)  # not evenly
+    assert clock.until(scan(30, 2.98), scan(29, 2.9)) == pytest.approx(0.1)
+    assert clock.until(scan(30, 3.04), scan(29, 2.9)) == pytest.approx(0.1)
+    assert clock.until(scan(30, 5.9), scan(29, 2.9)) == pytest.approx(3.0)
+    assert clock.until(scan(30, 2.0), scan(29, 2.9)) == 0.0

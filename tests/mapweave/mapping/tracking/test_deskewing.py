@@ -149,6 +149,19 @@ def test_scans_that_come_in_batches_tell_the_velocity_of_evenly_spaced_ones() ->
     np.testing.assert_allclose(deskewer.to_stamp, [-0.025, 0.0, 0.0], atol=0.008)
 
 
+def test_one_that_starts_afresh_knows_how_long_scans_take() -> None:
+    before = Deskewer()
+    for k in range(20):
+        go(before, 0.1 * k, k, [0.05 * k, 0.0, 0.0])
+    deskewer = before.afresh()
+    deskewer.placed(at(2.0, 20), np.zeros(3))  # which waited, and was straightened before
+    deskewer.placed(at(2.1, 21), np.array([0.05, 0.0, 0.0]))
+    deskewer.straight(
+        Scan(np.full(91, 2.0), np.radians(np.arange(-45.0, 46.0)), 22, 2.2, sweep=0.1)
+    )
+    np.testing.assert_allclose(deskewer.to_stamp, [-0.025, 0.0, 0.0], atol=1e-6)
+
+
 def test_a_robot_that_hardly_moves_is_left_as_it_is() -> None:
     scan = Scan(np.full(91, 2.0), np.radians(np.arange(-45.0, 46.0)), stamp=0.2, sweep=0.1)
     deskewer = Deskewer()
