@@ -20,7 +20,6 @@ QUICK = 0.02  # [s] from one scan to the next: few lidars are as quick, batches 
 BATCHED = 6.0  # times the median, that a gap between batches takes
 GAPS = 3  # or more, among those remembered: fewer are pauses
 RUNS = (4, 8, 16)  # scans together, of which a batch may be a part
-JITTER = 0.5  # of the usual time, by which stamps of a lidar that spins evenly err
 SHORTEST = 0.005  # [s] a scan: no lidar spins two hundred times a second
 
 
@@ -77,16 +76,11 @@ class ScanClock:
         return max(counted, told) if math.isfinite(told) else counted
 
     def until(self, scan: Scan, last: Scan) -> float:
-        """Return how long [s] it took from the `last` scan to `scan`, at best; 0 if nothing tells.
-
-        A lidar spins evenly: by what its stamps jitter, they err.
-        """
+        """Return how long [s] it took from the `last` scan to `scan`; 0 where nothing tells."""
+        if self.is_batched:
+            return max(scan.index - last.index, 1) * (self.interval or 0.0)
         told = scan.stamp - last.stamp
-        if self.interval is None:
-            return 0.0
-        counted = max(scan.index - last.index, 1) * self.interval
-        is_even = self.is_batched or abs(told - counted) <= JITTER * self.interval
-        return counted if is_even else max(told, 0.0)
+        return 0.0 if self.interval is None else max(told, 0.0)
 
     def _usual(self) -> float:
         count = len(self._intervals)

@@ -76,10 +76,7 @@ class Deskewer:
         if before is None:
             return None
         last, pose = before
-        # It is of the stamps, however these jitter.
-        batched = self._clock.is_batched
-        since = self._clock.until(scan, last) if batched else scan.stamp - last.stamp
-        return _velocity(pose, scan.odometry, since)
+        return _velocity(pose, scan.odometry, self._clock.until(scan, last))
 
 
 def deskewed(scan: Scan, velocity: FloatArray) -> Scan:

@@ -70,10 +70,11 @@ def test_pauses_are_no_batches(at: int, second: int) -> None:
     assert all(interval == pytest.approx(0.1) for interval in told)
 
 
-def test_steps_are_told_by_the_usual_time_where_stamps_jitter_and_by_these_after_a_pause() -> None:
+def test_steps_take_what_stamps_say_and_in_batches_what_scans_usually_take() -> None:
     clock = ticked([0.1 * k for k in range(30)])
-    assert clock.until(scan(30, 2.93), scan(29, 2.9)) == pytest.approx(0.03)  # not evenly
-    assert clock.until(scan(30, 2.98), scan(29, 2.9)) == pytest.approx(0.1)
-    assert clock.until(scan(30, 3.04), scan(29, 2.9)) == pytest.approx(0.1)
+    assert clock.until(scan(30, 2.93), scan(29, 2.9)) == pytest.approx(0.03)
     assert clock.until(scan(30, 5.9), scan(29, 2.9)) == pytest.approx(3.0)
     assert clock.until(scan(30, 2.0), scan(29, 2.9)) == 0.0
+    batched = ticked([k // 10 + k % 10 * 0.002 for k in range(70)])
+    step = batched.until(scan(66, 6.012), scan(65, 6.01))
+    assert step == batched.interval == pytest.approx(0.1, abs=0.03)
