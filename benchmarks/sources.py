@@ -136,7 +136,7 @@ class Mapped:
 
 
 def _mapped(scans: Sequence[Scan]) -> Mapped:
-    mapper, poses = Mapper(ROBOT), {}
+    mapper, poses = Mapper(ROBOT, prompt=True), {}
     for scan in track(scans, "mapping the file", len(scans)):
         placement = mapper.add(scan)
         if placement.pose is not None:
