@@ -14,6 +14,15 @@ NEVER = 60.0  # [s]
 either = pytest.mark.parametrize("how", STOP_SIGNALS)
 
 
+@pytest.fixture(autouse=True)
+def _heard_again() -> Iterator[None]:
+    """Have signals be heard again after a test: what others start would ignore them as well."""
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 def tell(how: signal.Signals) -> None:
     os.kill(os.getpid(), how)
     time.sleep(0.01)
