@@ -83,6 +83,7 @@ class ScanClock:
         return 0.0 if self.interval is None else max(told, 0.0)
 
     def _usual(self) -> float:
+        """Return the usual time [s] as stamps tell it; note whether scans come in batches."""
         count = len(self._intervals)
         if count < FEW:
             return max(self._intervals)

@@ -23,7 +23,7 @@ class Stamps:
         self._scans += 1
         self._onwards += stamp > self._last
         self._back += stamp < self._last
-        self._passed += max(stamp - self._last, 0.0) if stamp > self._last else 0.0
+        self._passed += stamp - self._last if stamp > self._last else 0.0
         self._last = self._last if math.isnan(stamp) else stamp
 
     @property
