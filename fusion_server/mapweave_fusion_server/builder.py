@@ -61,12 +61,15 @@ class VersionBuilder:
     ----------
     series
         May be set while nothing is being built.
+    has_failed
+        Whether what was taken last could not be built, and was not just given up.
     """
 
     def __init__(
         self, series: str, config: Config, ready: Callable[[], object] = lambda: None
     ) -> None:
         self.series = series
+        self.has_failed = False
         self._ready = ready
         # The worker's alone.
         self._builder = JointMapBuilder(
@@ -130,6 +133,7 @@ class VersionBuilder:
         if future is None:
             return None
         error = future.exception()
+        self.has_failed = error is not None and not isinstance(error, OvertakenError)
         if isinstance(error, OvertakenError):
             return None
         if error is not None:

@@ -287,19 +287,25 @@ class Coordinator:
         self._drafted_at = now
         return self._draft
 
-    def finish(self, joint: JointMap | None, *, has_more: bool = False) -> None:
+    def finish(
+        self, joint: JointMap | None, *, has_more: bool = False, has_failed: bool = False
+    ) -> None:
         """End the draft that became `joint`; None, where it was not built, keeps its number.
 
         Where what is known `has_more` in it than was made of it, another version follows. What
-        follows one that was not built is as urgent.
+        follows one that was given up is as urgent; what follows one that `has_failed` may fail as
+        well, and keeps the interval.
         """
         self._raise_urgency(Urgency.MORE if has_more else Urgency.NONE)
-        self._is_begun_anew = joint is None and self.is_awaited
+        was_given_up = joint is None and not has_failed
+        self._is_begun_anew = was_given_up and self.is_awaited
         if joint is None and self.has_news:
-            self._raise_urgency(self._drafted)
+            self._raise_urgency(self._drafted if was_given_up else Urgency.SOON)
+        if not was_given_up:
+            self._begun = self._drafted_at
         if joint is not None:
             self._version, self._judged = joint.version, joint.alignments
-            self._is_last_known, self._begun = True, self._drafted_at
+            self._is_last_known = True
         self._draft, self._drafted = None, Urgency.NONE
 
     def _alignments_in_force(self) -> Iterator[Alignment]:

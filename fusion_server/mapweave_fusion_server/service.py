@@ -180,8 +180,11 @@ class Service:
             self._speaking.hurry()  # robots wait for their new frames
             self._feed.show_version(built.draft.version, built.draft.maps, kept.message)
             record(self._story.joined(built.joint))
-        has_more = built is not None and built.has_more
-        self._coordinator.finish(built.joint if built else None, has_more=has_more)
+        self._coordinator.finish(
+            built.joint if built else None,
+            has_more=built is not None and built.has_more,
+            has_failed=self._builder.has_failed,
+        )
 
     def _keep(self, built: Built) -> Built:
         """Store a version; return it, as one of another series where there is no room."""

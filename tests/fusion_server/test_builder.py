@@ -64,6 +64,24 @@ def test_a_version_that_was_overtaken_is_given_up_and_that_is_no_fault(
     assert not caplog.records
 
 
+def test_a_version_that_cannot_be_built_is_logged_and_told_apart_from_one_that_was_given_up(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    with VersionBuilder("series", Config()) as builder:
+        with monkeypatch.context() as broken:
+            broken.setattr(JointMapBuilder, "build", fail)
+            builder.start(Draft(1, (), ()), time.time())
+            assert builder.take() is None
+        assert builder.has_failed
+        assert "a version could not be built" in caplog.text
+        builder.start(Draft(1, (), ()), time.time(), is_overtaken=lambda: True)
+        assert builder.take() is None
+        assert not builder.has_failed
+
+
 def test_a_version_says_whether_submaps_wait_for_the_next_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -234,6 +234,23 @@ def test_what_follows_a_version_that_was_given_up_is_as_urgent(
     assert coordinator.seconds_until_due(0.2) == 0.0
 
 
+def test_what_follows_a_version_that_could_not_be_built_keeps_the_interval(
+    make_map: MakeMap, make_alignments: MakeAlignments
+) -> None:
+    coordinator = _coordinator(min_interval=2.0)
+    a, b = make_map("a"), make_map("b")
+    coordinator.receive_map(a)
+    coordinator.receive_map(b)
+    coordinator.receive_alignments(make_alignments(a, b))
+    coordinator.begin(1.0)
+    coordinator.receive_map(make_map("c"))
+    coordinator.finish(None, has_failed=True)
+    assert coordinator.seconds_until_due(1.5) == 1.5
+    coordinator.begin(3.0)
+    coordinator.receive_map(make_map("d"))
+    assert coordinator.is_overtaken()  # it was not begun anew: the last one just failed
+
+
 def test_numbering_goes_on_after_a_restart(make_map: MakeMap) -> None:
     coordinator = _coordinator(last_version=41)
     coordinator.receive_map(make_map("a"))
