@@ -10,6 +10,7 @@ import zenoh
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags.frames import TF_STATIC
 from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN, UnreadableMessageError
+from mapweave.io.readers.ros_bags.one_laser import OneLaser
 from mapweave.io.refusals import Refusals
 from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
@@ -186,6 +187,8 @@ class _Topic:
         self._native = zenoh.KeyExpr(self._names.native)
         self._refusals = Refusals(laser.topic, tell)
         self._key = ""
+        self._one = OneLaser()
+        self._mounted: str | None = None  # the frame whose mounting is known
         self._mounting: Mounting | None = None
         self.is_known = False
         """Whether somebody said where it sits."""
@@ -206,7 +209,8 @@ class _Topic:
         None where that is not known, and needed: of several lasers. What is known at first holds: a
         laser that were turned round while it maps would map nothing.
         """
-        if self._mounting is None:
+        if self._mounting is None or self._mounted != self._one.frame:
+            self._mounted = self._one.frame
             self._mounting = self.laser.mounting or beside.mounting(self.laser.topic, frame)
             self.is_known = self._mounting is not None
         if self._mounting is None and alone:
@@ -225,9 +229,16 @@ class _Topic:
             return None  # as where a bridge says again what rmw_zenoh has said
         try:
             dds_type = self._names.type_at(arrival.key)
-            scan = messages.framed_scan(self.laser.topic, dds_type, arrival.payload, index)
+            frame, scan = messages.framed_scan(self.laser.topic, dds_type, arrival.payload, index)
         except UnreadableMessageError as error:
             self._refusals.add(str(error))
             return None
         self._key, self._heard = arrival.key, now
-        return scan
+        first = self._one.frame
+        if not self._one.has_taken(frame, scan.stamp):
+            self._refusals.add(
+                f"is of a laser in frame {frame!r}, beside those of {first!r}; expected one laser,"
+                " or each at a topic of its own and all of them named"
+            )
+            return None
+        return frame, scan

@@ -32,6 +32,7 @@ def laser_scan(
     *,
     range_min: float = 0.0,
     range_max: float = 100.0,
+    frame: str = "laser",
 ) -> bytes:
     """Return the message as it goes over the wire."""
     types = STORE.types
@@ -39,7 +40,7 @@ def laser_scan(
     sec = int(stamp // 1)
     header = types["std_msgs/msg/Header"](
         stamp=types["builtin_interfaces/msg/Time"](sec=sec, nanosec=int((stamp - sec) * 1e9)),
-        frame_id="laser",
+        frame_id=frame,
     )
     message = types[LASER_SCAN](
         header=header,

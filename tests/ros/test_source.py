@@ -131,6 +131,23 @@ def test_what_is_no_scan_is_told_and_the_next_one_is_taken(endpoint: str) -> Non
     assert told[0].startswith(f"{name}: message refused: ")
 
 
+def test_of_two_lasers_at_one_topic_the_first_is_heard_and_the_other_told_of(
+    endpoint: str,
+) -> None:
+    name, told = topic(), list[str]()
+    with (
+        laser(endpoint, native_key(name)) as sensor,
+        taking(endpoint, f"ros2:{name}", told.append) as taken,
+    ):
+        sensor.wait_for_listener()
+        for stamp, frame in ((1.0, "front"), (1.25, "rear"), (1.5, "/front"), (1.75, "rear")):
+            sensor.say(laser_scan(ROOM, -np.pi, STEP, stamp, frame=frame))
+        say(sensor, 9.0)  # of a third, after a while without any
+        assert [scan.stamp for scan in taken.wait(3)] == [1.0, 1.5, 9.0]
+    assert len(told) == 1
+    assert "is of a laser in frame 'rear', beside those of 'front'" in told[0]
+
+
 def test_a_topic_of_another_type_is_told_by_its_type(endpoint: str) -> None:
     name, told, heard = topic(), list[str](), threading.Event()
 

@@ -24,6 +24,7 @@ class Laser:
     angle_increment: float = 0.003
     range_min: float = 0.1
     range_max: float = 10.0
+    frame: str = "laser"
 
     def message(self, number: int, *, ros1: bool = False) -> object:
         """Return it as a message, the `number`-th."""
@@ -31,9 +32,9 @@ class Laser:
         time = store.types["builtin_interfaces/msg/Time"](sec=100 + number, nanosec=250_000_000)
         make = store.types["std_msgs/msg/Header"]
         header = (
-            make(seq=number, stamp=time, frame_id="laser")
+            make(seq=number, stamp=time, frame_id=self.frame)
             if ros1
-            else make(stamp=time, frame_id="laser")
+            else make(stamp=time, frame_id=self.frame)
         )
         return store.types[LASER_SCAN](
             header=header,

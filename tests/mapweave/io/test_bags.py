@@ -5,6 +5,7 @@ import math
 import shutil
 import sqlite3
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +120,28 @@ def test_of_several_lasers_one_has_to_be_named(form: str, tmp_path: Path) -> Non
     assert [count_scans(path, topic=name) for name in ("/front", "rear")] == [3, 2]
     with pytest.raises(FileError, match=r"no laser scans on topic /scan; there are /front \(3"):
         count_scans(path, topic="/scan")
+
+
+def test_of_two_lasers_at_one_topic_the_first_is_read_and_the_other_told_of(tmp_path: Path) -> None:
+    front, rear = lasers(6)[::2], lasers(6)[1::2]
+    both = [
+        each for f, r in zip(front, rear, strict=True) for each in (f, replace(r, frame="rear"))
+    ]
+    path = write(tmp_path, "mcap", {"/scan": both})
+    with pytest.warns(
+        UserWarning, match="what /scan has in frame 'rear' is of another laser, left"
+    ):
+        read = list(read_scans(path))
+    alone = list(read_scans(write(tmp_path / "alone", "mcap", {"/scan": front})))
+    assert [r.ranges.tolist() for r in read] == [a.ranges.tolist() for a in alone]
+    assert [scan.index for scan in read] == [0, 1, 2]
+
+
+def test_a_laser_whose_frame_has_another_name_after_a_while_is_the_same(tmp_path: Path) -> None:
+    before, after = lasers(8)[:4], [replace(each, frame="base_laser") for each in lasers(12)[4:]]
+    path = write(tmp_path, "mcap", {"/scan": before + after})
+    with pytest.warns(UserWarning, match="in frame 'base_laser' is of another laser, left out"):
+        assert len(list(read_scans(path))) == 12 - 5  # five seconds of it: it might have been two
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -22,6 +22,7 @@ from mapweave.io.readers.ros_bags.laser_messages import (
     Message,
     UnreadableMessageError,
 )
+from mapweave.io.readers.ros_bags.one_laser import OneLaser
 from mapweave.io.readers.tally import Tally
 from mapweave.scan.scan import Scan
 
@@ -210,6 +211,7 @@ def read_open_bag(path: Path, bag: Bag, options: ReadOptions) -> Iterator[Scan]:
     decoder = LaserDecoder()
     topic = choose_topic(path, bag, options.topic)
     beside = BesideScans.of(path, partial(_whole_of_type, bag), decoder, options, tally.assume)
+    laser = OneLaser()
     try:
         for message in _sound(bag.scans(topic), tally):
             tally.pieces += 1
@@ -217,6 +219,9 @@ def read_open_bag(path: Path, bag: Bag, options: ReadOptions) -> Iterator[Scan]:
                 frame, measured = decoder.framed_scan(message, tally.scans)
             except UnreadableMessageError as error:
                 tally.add_damaged(tally.pieces, error)
+                continue
+            if not laser.has_taken(frame, measured.stamp):
+                tally.assume(f"what {topic} has in frame {frame!r} is of another laser, left out")
                 continue
             scan = beside.completed(frame, measured)
             if options.on_laser is not None and not tally.scans:
