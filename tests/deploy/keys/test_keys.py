@@ -240,6 +240,8 @@ SETTINGS = {
     "mode": '{mode: "peer"}',
     "access_control": '{access_control: {enabled: true, default_permission: "allow"}}',
     "transport/link/tls": "{transport: {link: {tls: {enable_mtls: false}}}}",
+    "namespace": '{namespace: "ours"}',
+    "adminspace/permissions/write": "{adminspace: {enabled: true, permissions: {write: true}}}",
     "transport/shared_memory": "{transport: {shared_memory: {enabled: true, mode: 'init'}}}",
 }
 
@@ -267,5 +269,6 @@ def test_a_file_that_is_no_configuration_is_named(tmp_path: Path) -> None:
     file = tmp_path / "zenoh.json5"
     file.write_text("{mode: ")
     for path in (file, tmp_path / "nowhere.json5"):
-        with pytest.raises(FileError, match=path.name):
+        with pytest.raises(FileError, match=path.name) as told:
             session_config(["tcp/localhost:7447"], link=LinkSettings(extra=path))
+        assert "\n" not in str(told.value)
