@@ -129,10 +129,12 @@ class Store:
         if number != self.latest_version + 1:
             raise ValueError(f"version {number} does not follow {self.latest_version}")
         version = VersionRow(number, created, message, self._news if covers is None else covers)
-        if not self.resume() and self._held.series is not None:
+        if self._held.series is not None:
+            # With what waits: where there is room for that alone, there may be none for this.
             self._held.add_version(version)
+            self.resume()
             return
-        if self._held:
+        if not self.resume():
             raise UnwritableError(self.path, "the store cannot be written")
         with self._database.transaction(durable=True):
             version.insert(self._database)

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from mapweave.evidence import Evidence, RunnerUp
-from mapweave.geometry.arrays import FloatArray
+from mapweave.geometry.arrays import BoolArray, FloatArray
 from mapweave.io.annotations import MarkFile, OrderFile, PlacedMarkFile
 from mapweave.io.file_types import ComponentName, Count, FileModel, Metre, Pose, RobotId
 from mapweave.maps import (
@@ -65,13 +65,24 @@ class _LinesFile(FileModel):
         return self
 
     def line_map(self, free_space: Sequence[Sequence[tuple[float, float]]]) -> LineMap:
-        lengths = [len(polyline) for polyline in self.polylines]
+        kept = self.have_length()
+        counts = [len(polyline) for polyline in self.polylines]
+        polyline = np.repeat(np.arange(len(counts), dtype=np.int64), counts)[kept]
         return LineMap(
-            segments=np.array(_flat(self.polylines), dtype=np.float64).reshape(-1, 4),
-            polyline=np.repeat(np.arange(len(lengths), dtype=np.int64), lengths),
-            support=np.array(_flat(self.support), dtype=np.int64),
+            segments=self._segments()[kept],
+            polyline=np.unique(polyline, return_inverse=True)[1],
+            support=np.array(_flat(self.support), dtype=np.int64)[kept],
             free_space=tuple(np.array(polygon, dtype=np.float64) for polygon in free_space),
         )
+
+
+    def have_length(self) -> BoolArray:
+        """Tell of each segment whether it has a direction; the others, of one point, are no wall."""
+        segments = self._segments()
+        return np.any(segments[:, :2] != segments[:, 2:], axis=1)
+
+    def _segments(self) -> FloatArray:
+        return np.array(_flat(self.polylines), dtype=np.float64).reshape(-1, 4)
 
 
 class HeaderFile(FileModel):
@@ -292,11 +303,12 @@ class ComponentFile(_LinesFile):
 
     def to_component(self) -> JointComponent:
         """Return it as the library's value."""
+        sure = np.array(_flat(self.segment_confidence), dtype=np.float64)
         return JointComponent(
             robots={name: np.array(pose) for name, pose in self.robots.items()},
             confidence=self.confidence,
             map=self.line_map(self.free_space),
-            segment_confidence=np.array(_flat(self.segment_confidence), dtype=np.float64),
+            segment_confidence=sure[self.have_length()],
             marks=tuple(mark.to_mark() for mark in self.marks),
         )
 

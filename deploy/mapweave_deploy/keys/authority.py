@@ -24,6 +24,8 @@ from mapweave_protocol.link.security.folder import AUTHORITY, CERTIFICATE, KEY
 from mapweave_protocol.link.security.roster import Member
 
 AUTHORITY_KEY = "ca.key"
+# The authority outlives those it signs: their certificates are renewed, and it is not.
+AUTHORITY_DAYS = 3650
 EARLY = timedelta(days=1)  # clocks of robots go wrong: valid from before it is made
 PURPOSES = (ExtendedKeyUsageOID.CLIENT_AUTH, ExtendedKeyUsageOID.SERVER_AUTH)
 
@@ -43,10 +45,11 @@ class Authority:
 
     @classmethod
     def make(cls, team: str, now: datetime, days: int) -> Self:
-        """Return a new one, valid for so many days."""
+        """Return a new one, valid for so many days, and for ten years at least."""
         key = ec.generate_private_key(ec.SECP256R1())
         name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"mapweave {team}")])
-        builder = _builder(name, name, key.public_key(), now, days)
+        end = _after(now, max(days, AUTHORITY_DAYS))
+        builder = _builder(name, name, key.public_key(), now, end)
         usage = _usage(signs_certificates=True)
         certificate = (
             builder.add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
@@ -86,12 +89,15 @@ class Authority:
 
         Parameters
         ----------
+        days
+            How long it is valid, as far as we are ourselves.
         hosts
             Names and addresses under which it is reached: with any, it is a server's certificate.
         """
         key = ec.generate_private_key(ec.SECP256R1())
         subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, member.common_name)])
-        builder = _builder(self.certificate.subject, subject, key.public_key(), now, days)
+        end = min(_after(now, days), self.certificate.not_valid_after_utc)
+        builder = _builder(self.certificate.subject, subject, key.public_key(), now, end)
         purposes = PURPOSES if hosts else PURPOSES[:1]
         signer = x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key())
         builder = (
@@ -117,7 +123,11 @@ def write_key(path: Path, key: ec.EllipticCurvePrivateKey) -> None:
 
 
 def _builder(
-    issuer: x509.Name, subject: x509.Name, key: ec.EllipticCurvePublicKey, now: datetime, days: int
+    issuer: x509.Name,
+    subject: x509.Name,
+    key: ec.EllipticCurvePublicKey,
+    now: datetime,
+    end: datetime,
 ) -> x509.CertificateBuilder:
     return (
         x509.CertificateBuilder()
@@ -126,8 +136,12 @@ def _builder(
         .public_key(key)
         .serial_number(x509.random_serial_number())
         .not_valid_before(now.astimezone(UTC) - EARLY)
-        .not_valid_after(now.astimezone(UTC) + timedelta(days=days))
+        .not_valid_after(end)
     )
+
+
+def _after(now: datetime, days: int) -> datetime:
+    return now.astimezone(UTC) + timedelta(days=days)
 
 
 def _name_of(key: ec.EllipticCurvePublicKey) -> x509.SubjectKeyIdentifier:

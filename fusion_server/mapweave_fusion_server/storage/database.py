@@ -4,6 +4,7 @@ import sqlite3
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -94,13 +95,16 @@ class Database:
                 target.close()
 
     def _connect(self, how: str) -> sqlite3.Connection:
-        return sqlite3.connect(
+        connection = sqlite3.connect(
             f"{self.path.resolve().as_uri()}?{how}",
             timeout=BUSY,
             isolation_level=None,
             check_same_thread=False,
             uri=True,
         )
+        # A damaged name is another name; by itself it would cost the store.
+        connection.text_factory = partial(str, encoding="utf-8", errors="replace")
+        return connection
 
     def _only_read(self) -> None:
         """Write nothing; where nobody can, as on a medium that is read only, not even a journal."""

@@ -3,6 +3,7 @@
 import logging
 import secrets
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +18,46 @@ COLUMNS = {
     "mark": "robot, boot, received, message, checksum, news",
     "operator_order": "id, received, message, checksum, news",
 }
+INDEXED = tuple(table for table in MESSAGE_TABLES if table != "version")
+TYPES: dict[str, tuple[type, ...]] = {  # of columns; of all others, which are numbers, integer
+    "created": (int, float),
+    "received": (int, float),
+    "message": (bytes,),
+    **dict.fromkeys(("first", "second", "robot", "boot"), (str,)),
+}
 PROBED = 20_000  # rows tried one by one between those that can be reached from either end
 
 _log = logging.getLogger(__name__)
 
 
 def is_sound(database: Database) -> bool:
-    """Tell whether the structure of the file is whole."""
+    """Tell whether the structure of the file is whole, and all that is beside the messages.
+
+    Messages are compared with their checksums where they are read, each for itself.
+    """
     try:
-        return database.rows("PRAGMA quick_check(1)") == [("ok",)]
+        checks = ["quick_check(1)", *(f"integrity_check({table})" for table in INDEXED)]
+        if any(database.rows(f"PRAGMA {check}") != [("ok",)] for check in checks):
+            return False
+        return not any(map(partial(_has_what_it_cannot_be, database), MESSAGE_TABLES))
     except DamagedError:
         return False
+
+
+def _has_what_it_cannot_be(database: Database, table: str) -> bool:
+    """Tell whether something beside a message of `table` is of another kind than it can be."""
+    names = {int: "integer", float: "real", str: "text"}
+    wrong = [
+        f"typeof({column}) NOT IN ({', '.join(repr(names[kind]) for kind in kinds)})"
+        for column, kinds in _types_of(table).items()
+        if kinds != TYPES["message"]  # that costs the row alone
+    ]
+    return bool(database.rows(f"SELECT 1 FROM {table} WHERE {' OR '.join(wrong)} LIMIT 1"))
+
+
+def _types_of(table: str) -> dict[str, tuple[type, ...]]:
+    kinds = {column: TYPES.get(column, (int,)) for column in COLUMNS[table].split(", ")}
+    return kinds | ({"id": (str,)} if table == "operator_order" else {})
 
 
 def salvage(damaged: Database, path: Path, team: str) -> Path:
@@ -141,7 +171,9 @@ def _walk(damaged: Database, table: str, order: str) -> Iterator[tuple[int, tupl
 
 
 def _whole(table: str, row: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
-    columns = COLUMNS[table].split(", ")
-    message, expected = row[columns.index("message")], row[columns.index("checksum")]
-    if isinstance(message, bytes) and checksum(message) == expected:
+    kinds = _types_of(table)
+    if not all(isinstance(value, kind) for value, kind in zip(row, kinds.values(), strict=True)):
+        return
+    values = dict(zip(kinds, row, strict=True))
+    if checksum(values["message"]) == values["checksum"]:
         yield row

@@ -185,7 +185,8 @@ def _refused(status: StatusMessage | JointStatusMessage) -> str:
     return ", ".join(f"{count} {what}" for what, count in status.refused.items()) or "0"
 
 
-def _as_json(team: Team) -> str:
+def as_json(team: Team) -> str:
+    """Return the same for programs, as one line."""
     return json.dumps(
         {
             "coordinators": sorted(team.coordinators),
@@ -214,7 +215,7 @@ def _run(options: argparse.Namespace) -> int:
     with open_session(endpoints, patience=options.patience, link=link) as session:
         team = listen(session, name, LISTENED)
     if options.json:
-        print(_as_json(team))  # noqa: T201
+        print(as_json(team))  # noqa: T201
     else:
         Console(width=None if sys.stdout.isatty() else 200).print(table_of(team))
     return 0 if team.coordinators else EXIT_FAILED

@@ -48,7 +48,8 @@ class WireModel(BaseModel):
     as by default may be left off. So is a dictionary whose names are known (`placed`).
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    # Digests are any bytes; in JSON they are told in hexadecimal digits.
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, ser_json_bytes="hex")
 
     @model_validator(mode="before")
     @classmethod

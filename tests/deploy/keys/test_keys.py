@@ -1,6 +1,7 @@
 """What `mapweave keys` makes, and what is made of it."""
 
 import json
+import shutil
 import stat
 from datetime import UTC, datetime
 from pathlib import Path
@@ -97,6 +98,61 @@ def test_a_name_that_is_no_id_gets_no_keys(tmp_path: Path, name: str) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--hosts", "böse.local"),
+        ("--hosts", "two words"),
+        ("--hosts", "base.local:7447"),
+        ("--page", "tls/base.local"),
+        ("--page", ""),
+        ("--hosts", "a" * 64),
+        ("--hosts", ".".join(["a" * 60] * 5)),
+        ("--days", "3000000"),
+        ("--days", "9" * 15),
+    ],
+)
+def test_what_no_certificate_can_say_is_wrong_usage_and_nothing_is_made(
+    words: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["keys", "rescue", "--output", str(tmp_path / "keys"), *words])
+    assert ended.value.code == 2
+    assert f"argument {words[0]}: {words[1]}: expected" in capsys.readouterr().err
+    assert not (tmp_path / "keys").exists()
+
+
+def test_an_address_in_brackets_as_endpoints_have_it_is_that_address(tmp_path: Path) -> None:
+    folder = tmp_path / "keys"
+    assert main(["keys", "rescue", "--output", str(folder), "--hosts", "[fd00::1]"]) == 0
+    content = (folder / "router" / "cert.pem").read_bytes()
+    names = x509.load_pem_x509_certificate(content).extensions.get_extension_for_class(
+        x509.SubjectAlternativeName
+    )
+    addresses = names.value.get_values_for_type(x509.IPAddress)
+    assert "fd00::1" in {str(address) for address in addresses}
+
+
+def test_a_certificate_is_no_longer_valid_than_the_authority_that_signed_it(
+    tmp_path: Path,
+) -> None:
+    folder, words = tmp_path / "keys", ["keys", "rescue", "--output"]
+    assert main([*words, str(folder), "--robots", "r1", "--days", "2"]) == 0
+    assert main([*words, str(folder), "--robots", "r2", "--days", "36500"]) == 0
+    authority, first, second = (
+        x509.load_pem_x509_certificate((folder / path).read_bytes()).not_valid_after_utc
+        for path in ("ca.pem", "robots/r1/cert.pem", "robots/r2/cert.pem")
+    )
+    assert first < second == authority
+
+
+def test_who_lost_the_folder_gets_another_certificate_by_the_same_command(folder: Path) -> None:
+    before = (folder / "robots" / "r1" / "cert.pem").read_bytes()
+    shutil.rmtree(folder / "robots" / "r1")
+    assert main(["keys", "rescue", "--output", str(folder)]) == 0
+    assert (folder / "robots" / "r1" / "cert.pem").read_bytes() != before
+
+
 def test_no_name_is_another_s(folder: Path) -> None:
     roster = Roster("rescue", ("ann", "coordinator"), ("ann",), ("ann",))
     names = [member.common_name for member in roster.members]
@@ -184,6 +240,8 @@ SETTINGS = {
     "mode": '{mode: "peer"}',
     "access_control": '{access_control: {enabled: true, default_permission: "allow"}}',
     "transport/link/tls": "{transport: {link: {tls: {enable_mtls: false}}}}",
+    "namespace": '{namespace: "ours"}',
+    "adminspace/permissions/write": "{adminspace: {enabled: true, permissions: {write: true}}}",
     "transport/shared_memory": "{transport: {shared_memory: {enabled: true, mode: 'init'}}}",
 }
 
@@ -211,5 +269,6 @@ def test_a_file_that_is_no_configuration_is_named(tmp_path: Path) -> None:
     file = tmp_path / "zenoh.json5"
     file.write_text("{mode: ")
     for path in (file, tmp_path / "nowhere.json5"):
-        with pytest.raises(FileError, match=path.name):
+        with pytest.raises(FileError, match=path.name) as told:
             session_config(["tcp/localhost:7447"], link=LinkSettings(extra=path))
+        assert "\n" not in str(told.value)

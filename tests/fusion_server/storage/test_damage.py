@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from mapweave_fusion_server.storage.view import StoreView
 from mapweave_fusion_server.store import Store
+from mapweave_protocol.wire.model import MAX_COUNT
 
 VERSIONS = 40
 
@@ -129,3 +131,28 @@ def test_a_store_without_its_owner_goes_on_in_a_new_series(path: Path) -> None:
     with Store(path, "rescue") as store:
         assert store.series != series
         assert store.latest_version == VERSIONS
+
+
+@pytest.mark.parametrize("message", [b"version 3 version 3 ", b"found", b"map of b", b"marks of a"])
+def test_a_bit_wrong_beside_a_message_costs_no_more_than_that_row(
+    path: Path, message: bytes
+) -> None:
+    """Numbers, times, names, and what SQLite notes of each: bits of the 24 bytes before it."""
+    whole = path.read_bytes()
+    start = whole.index(message)
+    for bit in range(8 * (start - 24), 8 * start, 5):
+        content = bytearray(whole)
+        content[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(content)
+        with Store(path, "rescue") as store:
+            latest = store.latest_version
+            assert VERSIONS - 1 <= latest <= MAX_COUNT
+            assert len(list(store.versions_since(0))) >= VERSIONS - 2
+            assert len(store.last_maps()) >= 1
+            assert len(store.versions_created(0, 99)) >= VERSIONS - 2
+            assert store.orders() == [b"an order"]
+            store.add_version(latest + 1, 1.0, b"another")
+            store.keep_map(("c", "z"), 0, 1.0, b"map of c")
+        with StoreView(path) as view:
+            assert view.versions(99)
+        assert not any(path.parent.glob("*-wal"))

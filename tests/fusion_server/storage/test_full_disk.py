@@ -58,6 +58,21 @@ def test_what_does_not_fit_waits_and_is_answered_from_meanwhile(store: Store) ->
     assert store.map_of("a") == large
 
 
+def test_where_there_is_room_for_little_a_version_that_needs_more_waits(store: Store) -> None:
+    large = bytes(PAGES * 4096)
+    with pytest.raises(UnwritableError):
+        store.add_version(2, 2.0, large)
+    store.hold()  # what names its series would fit by itself
+    store.add_version(2, 2.0, large)
+    assert not store.is_storing
+    assert store.version(2) == large
+    store.add_version(3, 3.0, b"version 3")
+    assert store.latest_version == 3
+    _make_room(store)
+    assert store.resume()
+    assert [*store.versions_since(1)] == [large, b"version 3"]
+
+
 def test_what_waited_is_stored_when_there_is_room(store: Store) -> None:
     store.keep_map(("a", "x"), 0, 1.0, bytes(PAGES * 4096))
     store.add_alignments(("b", "a"), 1.0, b"found")

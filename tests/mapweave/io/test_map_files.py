@@ -113,11 +113,19 @@ def counts(length: int) -> st.SearchStrategy[Any]:
 
 
 @st.composite
+def walls(draw: st.DrawFn, count: int) -> FloatArray:
+    """Some no longer than can be seen, and no shorter than is written."""
+    segments = draw(floats((count, 4))) / 1e3
+    segments[:, 2] += np.where(np.hypot(*(segments[:, 2:] - segments[:, :2]).T) < 1e-3, 1.0, 0.0)
+    return segments
+
+
+@st.composite
 def line_maps(draw: st.DrawFn) -> LineMap:
     lengths = draw(st.lists(st.integers(1, 4), max_size=4))
     polygons = draw(st.lists(st.integers(3, 6), max_size=3))
     return LineMap(
-        segments=draw(floats((sum(lengths), 4))) / 1e3,  # no wall is longer than can be seen
+        segments=draw(walls(sum(lengths))),
         polyline=np.repeat(np.arange(len(lengths)), lengths),
         support=draw(counts(sum(lengths))),
         free_space=tuple(draw(floats((corners, 2))) for corners in polygons),
@@ -233,6 +241,22 @@ def test_a_joint_map_comes_back_as_it_was_written(joint: JointMap, tmp_path: Pat
     assert_same(load(tmp_path / "joint.json"), joint)
     for one, other in zip(found.alignments, joint.alignments, strict=True):
         assert (one.cause, one.status, one.reason) == (other.cause, other.status, other.reason)
+
+
+def test_a_segment_without_a_length_is_no_wall_and_left_out(tmp_path: Path) -> None:
+    point, wall = [1.0, 1.0, 1.0, 1.0], [0.0, 0.0, 4.0, 0.0]
+    walls = {"polylines": [[point], [wall, point]], "support": [[3], [5, 7]]}
+    a_map, joint = copy.deepcopy(MAP), copy.deepcopy(JOINT)
+    a_map["submaps"][0] |= walls
+    joint["components"][0] |= walls | {"segment_confidence": [[0.1], [0.5, 0.7]]}
+    for name, content in (("map", a_map), ("joint", joint)):
+        (tmp_path / name).write_text(json.dumps(content))
+    read = read_joint(tmp_path / "joint").components[0]
+    for lines in (read.map, read_map(tmp_path / "map").submaps[0].map):
+        assert lines.segments.tolist() == [wall]
+        assert lines.polyline.tolist() == [0]
+        assert lines.support.tolist() == [5]
+    assert read.segment_confidence.tolist() == [0.5]
 
 
 def test_a_map_file_has_the_published_fields(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from mapweave_protocol.link.session import open_session
-from mapweave_protocol.narration.status import COLUMNS, LISTENED, Team, listen, table_of
+from mapweave_protocol.narration.status import COLUMNS, LISTENED, Team, as_json, listen, table_of
 from mapweave_protocol.wire import keys
 from mapweave_protocol.wire.codec import encode
 from mapweave_protocol.wire.messages import (
@@ -80,6 +80,13 @@ def test_each_column_of_figures_is_explained_where_the_command_is() -> None:
 def test_two_coordinators_and_none_are_told() -> None:
     assert _lines(Team(coordinators={"a", "b"}))[1][1:4] == ["2", "of", "them"]
     assert _lines(Team())[1][1:] == ["no", "says", "nothing"]
+
+
+def test_a_digest_of_orders_is_told_to_programs_in_hexadecimal_digits() -> None:
+    digest = bytes(range(0x98, 0xA0))
+    statuses = {"r1": _status("r1", 3, orders=digest)}
+    told = json.loads(as_json(Team(statuses=statuses, coordinator=_coordinator(orders=digest))))
+    assert told["coordinator"]["orders"] == told["robots"]["r1"]["orders"] == digest.hex()
 
 
 def test_the_command_tells_what_a_team_says(endpoint: str, team: str) -> None:

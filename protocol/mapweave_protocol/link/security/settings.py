@@ -10,6 +10,7 @@ from typing import Self
 import zenoh
 
 from mapweave.errors import FileError
+from mapweave.text import shown
 from mapweave_protocol.link.security.folder import KeyFolder
 
 TLS_VARIABLE = "MAPWEAVE_TLS"
@@ -23,6 +24,8 @@ OURS = {
     "downsampling": "one allowance for all robots together would silence some of them",
     "qos": "it would outrank what publishers are given, and maps would wait for slow receivers",
     "aggregation": "advanced publishers would no longer be found",
+    "namespace": "under other keys nobody of the team would hear this program",
+    "adminspace/permissions/write": "whoever reaches it could set all of this otherwise",
     "plugins": "the programs here load none",
     "plugins_loading": "the programs here load none",
     "transport/link/tls": "--tls says it",
@@ -78,7 +81,7 @@ class LinkSettings:
         try:
             config = zenoh.Config.from_file(str(self.extra))
         except (zenoh.ZError, OSError) as error:
-            raise FileError(self.extra, f"not a configuration of Zenoh: {error}") from error
+            raise FileError(self.extra, f"not a configuration of Zenoh: {shown(str(error), 300)}") from error
         for path, why in OURS.items():
             if _value(config, path) != _value(zenoh.Config(), path):
                 raise FileError(self.extra, f"{path}: not to be set here: {why}")
