@@ -75,11 +75,10 @@ class _LinesFile(FileModel):
             free_space=tuple(np.array(polygon, dtype=np.float64) for polygon in free_space),
         )
 
-
     def have_length(self) -> BoolArray:
-        """Tell of each segment whether it has a direction; the others, of one point, are no wall."""
+        """Tell which segments have a direction; the others, of one point, are no wall."""
         segments = self._segments()
-        return np.any(segments[:, :2] != segments[:, 2:], axis=1)
+        return np.asarray(np.any(segments[:, :2] != segments[:, 2:], axis=1))
 
     def _segments(self) -> FloatArray:
         return np.array(_flat(self.polylines), dtype=np.float64).reshape(-1, 4)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
@@ -10,14 +11,18 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from mapweave.geometry.arrays import FloatArray
-from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN
+from mapweave.io.readers.ros_bags.laser_messages import LASER_SCAN, MULTI_ECHO_SCAN
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 
 
 @dataclass(frozen=True)
 class Laser:
-    """What a driver publishes; angles and distances as 32-bit numbers."""
+    """What a driver publishes; angles and distances as 32-bit numbers.
+
+    With `beyond` its beams come back twice but the first, which does not at all: (n,) how much
+    farther away the second time [m].
+    """
 
     ranges: FloatArray
     angle_min: float = -1.0
@@ -25,6 +30,12 @@ class Laser:
     range_min: float = 0.1
     range_max: float = 10.0
     frame: str = "laser"
+    beyond: FloatArray | None = None
+
+    @property
+    def kind(self) -> str:
+        """Type of the message."""
+        return LASER_SCAN if self.beyond is None else MULTI_ECHO_SCAN
 
     def message(self, number: int, *, ros1: bool = False) -> object:
         """Return it as a message, the `number`-th."""
@@ -36,7 +47,14 @@ class Laser:
             if ros1
             else make(stamp=time, frame_id=self.frame)
         )
-        return store.types[LASER_SCAN](
+        ranges: Any = np.asarray(self.ranges, dtype=np.float32)
+        intensities: Any = np.zeros(0, dtype=np.float32)
+        if self.beyond is not None:
+            echo = store.types["sensor_msgs/msg/LaserEcho"]
+            both = np.column_stack([self.ranges, self.ranges + self.beyond]).astype(np.float32)
+            ranges = [echo(echoes=each[: 2 * (beam > 0)]) for beam, each in enumerate(both)]
+            intensities = []
+        return store.types[self.kind](
             header=header,
             angle_min=self.angle_min,
             angle_max=self.angle_min + self.angle_increment * len(self.ranges),
@@ -45,8 +63,8 @@ class Laser:
             scan_time=0.1,
             range_min=self.range_min,
             range_max=self.range_max,
-            ranges=np.asarray(self.ranges, dtype=np.float32),
-            intensities=np.zeros(0, dtype=np.float32),
+            ranges=ranges,
+            intensities=intensities,
         )
 
 
@@ -63,9 +81,9 @@ def write_bag(path: Path, topics: dict[str, list[Laser]], compression: str = "")
         writer.set_compression(Writer1.CompressionFormat[compression.upper()])
     with writer:
         for topic, scans in topics.items():
-            connection = writer.add_connection(topic, LASER_SCAN, typestore=ROS1)
+            connection = writer.add_connection(topic, _kind(scans), typestore=ROS1)
             for number, scan in enumerate(scans):
-                data = ROS1.serialize_ros1(scan.message(number, ros1=True), LASER_SCAN)
+                data = ROS1.serialize_ros1(scan.message(number, ros1=True), scan.kind)
                 writer.write(connection, number * 10**8, data)
     return path
 
@@ -80,9 +98,13 @@ def write_recording(
         writer.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)
     with writer:
         for topic, scans in topics.items():
-            connection = writer.add_connection(topic, LASER_SCAN, typestore=ROS2)
+            connection = writer.add_connection(topic, _kind(scans), typestore=ROS2)
             for number, scan in enumerate(scans):
-                data = ROS2.serialize_cdr(scan.message(number), LASER_SCAN)
+                data = ROS2.serialize_cdr(scan.message(number), scan.kind)
                 writer.write(connection, number * 10**8, data)
     (file,) = (path for path in folder.iterdir() if path.suffix != ".yaml")
     return file
+
+
+def _kind(scans: list[Laser]) -> str:
+    return scans[0].kind if scans else LASER_SCAN

@@ -137,6 +137,21 @@ def test_of_two_lasers_at_one_topic_the_first_is_read_and_the_other_told_of(tmp_
     assert [scan.index for scan in read] == [0, 1, 2]
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_of_a_beam_that_came_back_several_times_the_first_echo_counts(
+    form: str, tmp_path: Path
+) -> None:
+    once = lasers(5)
+    twice = [replace(scan, beyond=np.linspace(0.3, 2.0, len(scan.ranges))) for scan in once]
+    path = write(tmp_path, form, {"/multi": twice})
+    read = list(read_scans(path))
+    (tmp_path / "alone").mkdir()
+    alone = list(read_scans(write(tmp_path / "alone", form, {"/scan": once})))
+    assert all(math.isnan(scan.ranges[0]) for scan in read)
+    assert [r.ranges[1:].tolist() for r in read] == [a.ranges[1:].tolist() for a in alone]
+    assert count_scans(cut(path, path.stat().st_size - 40), topic="/multi") > 0
+
+
 def test_a_laser_whose_frame_has_another_name_after_a_while_is_the_same(tmp_path: Path) -> None:
     before, after = lasers(8)[:4], [replace(each, frame="base_laser") for each in lasers(12)[4:]]
     path = write(tmp_path, "mcap", {"/scan": before + after})

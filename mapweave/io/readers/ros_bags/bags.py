@@ -17,7 +17,7 @@ from mapweave.errors import FileError, MissingExtraError
 from mapweave.io.readers.options import ReadOptions
 from mapweave.io.readers.ros_bags.beside_scans import BesideScans
 from mapweave.io.readers.ros_bags.laser_messages import (
-    LASER_SCAN,
+    LASER_SCANS,
     LaserDecoder,
     Message,
     UnreadableMessageError,
@@ -88,7 +88,7 @@ class WholeBag:
         """As of `Bag`."""
         counts: Counter[str] = Counter()
         for connection in self.reader.connections:
-            if connection.msgtype == LASER_SCAN:
+            if connection.msgtype in LASER_SCANS:
                 counts[connection.topic] += connection.msgcount
         return dict(counts)
 
@@ -97,7 +97,7 @@ class WholeBag:
         chosen = [
             connection
             for connection in self.reader.connections
-            if connection.msgtype == LASER_SCAN and connection.topic == topic
+            if connection.msgtype in LASER_SCANS and connection.topic == topic
         ]
         yield from self._messages(chosen)
 
@@ -121,17 +121,20 @@ class CutBag:
 
     def lasers(self) -> dict[str, int]:
         """As of `Bag`."""
-        return dict(Counter(message.topic for message in self.of_type(LASER_SCAN)))
+        return dict(Counter(message.topic for message in self._of_types(LASER_SCANS)))
 
     def scans(self, topic: str) -> Iterator[Message]:
         """As of `Bag`."""
-        return (message for message in self.of_type(LASER_SCAN) if message.topic == topic)
+        return (message for message in self._of_types(LASER_SCANS) if message.topic == topic)
 
     def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
-        """As of `Bag`, up to where damage leads the walk astray."""
+        """As of `Bag`."""
+        return (m for m in self._of_types((kind,)) if m.topic.endswith(ending))
+
+    def _of_types(self, kinds: Sequence[str]) -> Iterator[Message]:
+        """Yield messages up to where damage leads the walk astray."""
         try:
-            found = (m for m in self.walk(self.path) if m.type == kind)
-            yield from (m for m in found if m.topic.endswith(ending))
+            yield from (m for m in self.walk(self.path) if m.type in kinds)
         except damage_errors():
             return  # told as `cut_off` already
 

@@ -1,4 +1,4 @@
-"""``sensor_msgs/LaserScan``, as it was recorded, to a scan."""
+"""``sensor_msgs/LaserScan``, as it was recorded, to a scan; of several echoes a beam the first."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapweave.scan.scan import Scan
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
+MULTI_ECHO_SCAN = "sensor_msgs/msg/MultiEchoLaserScan"
+LASER_SCANS = LASER_SCAN, MULTI_ECHO_SCAN
 ODOMETRY = "nav_msgs/msg/Odometry"
 TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 ROS1, CDR = "ros1", "cdr"
@@ -73,9 +76,10 @@ class LaserDecoder:
 
     def framed_scan(self, message: Message, index: int) -> tuple[str, Scan]:
         """Return the frame of the laser, and the scan in `message`; as `scan`."""
-        laser = self.decode(message, LASER_SCAN)
+        laser = self.decode(message, message.type)
+        measured = _first_echoes(laser) if message.type == MULTI_ECHO_SCAN else laser.ranges
         try:
-            return str(laser.header.frame_id), _scan(laser, index)
+            return str(laser.header.frame_id), _scan(laser, measured, index)
         except (ValueError, IndexError) as error:
             raise UnreadableMessageError(str(error) or "is not whole") from error
 
@@ -101,10 +105,16 @@ def _serde_error() -> type[Exception]:
     return SerdeError
 
 
-def _scan(laser: Any, index: int) -> Scan:  # noqa: ANN401
+def _first_echoes(laser: Any) -> NDArray[np.float32]:  # noqa: ANN401
+    """Return what came back first in each beam; what comes after was seen through glass or rain."""
+    echoes = [beam.echoes[0] if len(beam.echoes) else math.nan for beam in laser.ranges]
+    return np.array(echoes, dtype=np.float32)
+
+
+def _scan(laser: Any, ranges: NDArray[np.float32], index: int) -> Scan:  # noqa: ANN401
     """Return the scan of a message."""
     with np.errstate(invalid="ignore"):  # NaN of the kind that signals
-        measured = laser.ranges.astype(np.float64)
+        measured = ranges.astype(np.float64)
     stamp = laser.header.stamp
     return Scan.of(
         measured,
