@@ -5,14 +5,15 @@ from typing import Any
 from mapweave.errors import ArgumentError, MissingExtraError
 from mapweave.io.readers.ros_bags.laser_messages import (
     CDR,
-    LASER_SCAN,
+    LASER_SCANS,
     LaserDecoder,
     Message,
     UnreadableMessageError,
 )
 from mapweave.scan.scan import Scan, check_beams
-from mapweave_ros.topics import DDS_LASER_SCAN
+from mapweave_ros.topics import DDS_LASER_SCAN, dds_type_of
 
+KINDS = {dds_type_of(kind): kind for kind in LASER_SCANS}
 MAX_BYTES = 2**20  # of a message: ten thousand beams and their intensities are a tenth of it
 NOISE = (AssertionError, TypeError, MemoryError)  # what rosbags makes of it
 
@@ -44,7 +45,7 @@ class ScanMessages:
         Parameters
         ----------
         dds_type
-            As the key says it; None where it does not.
+            As the key says it; None where it does not, and it is taken for a ``LaserScan``.
         index
             The scan's.
 
@@ -53,11 +54,12 @@ class ScanMessages:
         UnreadableMessageError
             If there is none; its text says why.
         """
-        if dds_type not in (None, DDS_LASER_SCAN):
+        kind = KINDS.get(dds_type or DDS_LASER_SCAN)
+        if kind is None:
             raise UnreadableMessageError(f"is a {dds_type}; expected a {DDS_LASER_SCAN}")
         _check_size(payload)
         try:
-            frame, scan = self._decoder.framed_scan(Message(topic, LASER_SCAN, CDR, payload), index)
+            frame, scan = self._decoder.framed_scan(Message(topic, kind, CDR, payload), index)
         except NOISE as error:
             raise UnreadableMessageError("is no LaserScan") from error
         try:

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapweave.io.readers.ros_bags.laser_messages import UnreadableMessageError
+from mapweave.io.readers.ros_bags.laser_messages import MULTI_ECHO_SCAN, UnreadableMessageError
 from mapweave.io.refusals import Refusals
 from mapweave_ros.scan_messages import MAX_BYTES, ScanMessages
+from tests.mapweave.io.bag_files import ROS2, Laser
 from tests.ros.lasers import TYPE, laser_scan
 
 MESSAGES = ScanMessages()
@@ -23,6 +24,13 @@ def test_whatever_is_written_for_no_return_is_none() -> None:
     written = [0.0, np.inf, -np.inf, np.nan, -1.0, 30.0, 31.0, 0.05, *[2.0] * 4]
     ranges = read(laser_scan(written, 0.0, TURN, range_min=0.1, range_max=30.0))
     assert np.isfinite(ranges).tolist() == [False] * 8 + [True] * 4
+
+
+def test_of_several_echoes_a_beam_the_first_counts() -> None:
+    message = Laser(np.full(40, 2.0), beyond=np.full(40, 1.5)).message(0)
+    payload = bytes(ROS2.serialize_cdr(message, MULTI_ECHO_SCAN))
+    ranges = read(payload, "sensor_msgs::msg::dds_::MultiEchoLaserScan_")
+    assert ranges[1:].tolist() == [2.0] * 39
 
 
 @pytest.mark.parametrize("range_max", [0.0, np.nan, np.inf, -1.0])
