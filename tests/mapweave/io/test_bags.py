@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import IndexType, Writer
 
 from mapweave.errors import FileError, MissingExtraError
 from mapweave.io.readers import count_scans, read_scans
@@ -36,6 +38,22 @@ def same(one: list[Scan], other: list[Scan]) -> bool:
         and (a.index, a.stamp) == (b.index, b.stamp)
         for a, b in zip(one, other, strict=True)
     )
+
+
+def reindex(path: Path, kinds: IndexType, *, statistics: bool) -> None:
+    """Write the messages of an MCAP again, some in a chunk, with indexes of some kinds."""
+    with path.open("rb") as file:
+        found = list(make_reader(file).iter_messages())
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=10_000, index_types=kinds, use_statistics=statistics)
+        writer.start(profile="ros2")
+        schema, channel, _ = found[0]
+        assert schema is not None
+        number = writer.register_schema(schema.name, schema.encoding, schema.data)
+        topic = writer.register_channel(channel.topic, channel.message_encoding, number)
+        for _, _, message in found:
+            writer.add_message(topic, message.log_time, message.data, message.publish_time)
+        writer.finish()
 
 
 def cut(path: Path, size: int) -> Path:
@@ -103,6 +121,21 @@ def test_a_folder_without_metadata_gives_its_files_in_order(form: str, tmp_path:
         read = [scan.ranges.astype(np.float32).tolist() for scan in read_scans(folder)]
     assert read == [scan.ranges.astype(np.float32).tolist() for scan in scans]
     assert count_scans(folder) == 12
+
+
+@pytest.mark.parametrize("statistics", [True, False])
+def test_chunks_of_which_no_index_says_what_they_hold_are_read(
+    statistics: bool, tmp_path: Path
+) -> None:
+    scans = lasers(60, beams=200)
+    indexed = write(tmp_path, "mcap", {"/scan": scans})
+    whole = list(read_scans(indexed))
+    reindex(indexed, IndexType.ALL & ~IndexType.MESSAGE, statistics=statistics)
+    for path in (indexed, indexed.parent):
+        assert same(list(read_scans(path)), whole)
+    with mcap.open_whole(indexed) as reader:
+        assert len(reader.chunks) > 1
+        assert not mcap.is_indexed(reader)
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -1,7 +1,7 @@
 """Folders of ROS 2 bags: files in SQLite or MCAP, and ``metadata.yaml``, where it was written."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def read(path: Path, options: ReadOptions) -> Iterator[Scan]:
 
 
 def _open(path: Path, stack: ExitStack) -> Bag:
-    """Open the recording by its metadata; file by file where there is none, or a file is cut."""
+    """Open the recording by its metadata; file by file where there is none, or it loses some."""
     parts = [(file, found) for file in _in_order(path) if (found := _format(file))]
     told = (path / "metadata.yaml").is_file()
     if parts or told:
@@ -41,7 +41,10 @@ def _open(path: Path, stack: ExitStack) -> Bag:
         from rosbags.rosbag2 import Reader
 
         try:
-            return WholeBag(stack.enter_context(Reader(path)), CDR)
+            reader = stack.enter_context(Reader(path))
+            files: Sequence[object] = getattr(reader.storage, "storages", ())
+            if not parts or all(map(mcap.is_indexed, files)):
+                return WholeBag(reader, CDR)
         except damage_errors() as error:
             if not parts:
                 raise FileError(path, f"cannot be read ({error}); {EXPECTED}") from error

@@ -51,12 +51,15 @@ class BagFormat:
         Opens the reader that `rosbags` has for it.
     walk
         Yields the whole messages of a bag that need not be whole.
+    is_indexed
+        Tells whether that reader finds all messages; by default it is trusted to.
     """
 
     encoding: str
     is_whole: Callable[[Path], bool]
     open_whole: Callable[[Path], AbstractContextManager[Any]]
     walk: Callable[[Path], Iterator[Message]]
+    is_indexed: Callable[[Any], bool] = lambda _: True
 
 
 class Bag(Protocol):
@@ -182,7 +185,9 @@ def open_bag(path: Path, bag_format: BagFormat, stack: ExitStack) -> Bag:
             reader = stack.enter_context(bag_format.open_whole(path))
         except damage_errors():
             return CutBag(path, bag_format.walk, "has an index that cannot be read")
-        return WholeBag(reader, bag_format.encoding)
+        if bag_format.is_indexed(reader):
+            return WholeBag(reader, bag_format.encoding)
+        return CutBag(path, bag_format.walk, None)
     return CutBag(path, bag_format.walk)
 
 

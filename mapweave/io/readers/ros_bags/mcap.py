@@ -53,6 +53,15 @@ def open_whole(path: Path) -> Iterator[Any]:
         reader.close()
 
 
+def is_indexed(reader: object) -> bool:
+    """Tell whether an index says of each chunk of an opened file what is in it.
+
+    The format leaves that to the recorder (`noMessageIndex` in ROS 2); `rosbags` takes a chunk of
+    which nothing is said for one that holds nothing.
+    """
+    return all(chunk.message_index_offsets for chunk in getattr(reader, "chunks", ()))
+
+
 def walk(path: Path) -> Iterator[Message]:
     """Yield the whole messages of a file that need not be whole, in its order."""
     schemas: dict[int, str] = {}
@@ -134,4 +143,4 @@ def _zstd(packed: bytes) -> bytes:
     return zstd.ZstdDecompressor().decompress(packed, _LARGEST)
 
 
-FORMAT = BagFormat(CDR, is_whole, open_whole, walk)
+FORMAT = BagFormat(CDR, is_whole, open_whole, walk, is_indexed)
