@@ -113,7 +113,12 @@ class Sensor(_Checked):
         le=1000,
         description="readings at or beyond it are no returns; unset: as the log has it",
     )
-    range_min: _Metres = Field(0.0, ge=0, le=100, description="nearer readings are no returns")
+    range_min: _Metres = Field(
+        0.02,
+        ge=0,
+        le=100,
+        description="nearer readings are no returns; some lidars write what went wrong so",
+    )
     masks: _Sectors = Field(
         (),
         max_length=32,

@@ -24,7 +24,12 @@ from mapweave.mapping.submap_builder import SubmapBuilder
 from mapweave.mapping.tracking.acceptance import ScanMatch
 from mapweave.mapping.tracking.deskewing import Deskewer
 from mapweave.mapping.tracking.loss import Loss
-from mapweave.mapping.tracking.observation import Observation, ObservationParameters, observe
+from mapweave.mapping.tracking.observation import (
+    Observation,
+    ObservationParameters,
+    measured,
+    observe,
+)
 from mapweave.mapping.tracking.pose_covariance import (
     EXACT,
     PoseCovarianceParameters,
@@ -178,7 +183,7 @@ class Mapper:
             If it is no scan, or its index is not above that of the scan before it.
         """
         check_kind("scan", scan, Scan)
-        scan = self._numbered(scan)
+        scan = measured(self._numbered(scan), self.parameters.observation)
         finished = len(self._finished)
         if self._body.watch(scan) or self._sweeps.take_news():
             self._judge_again()

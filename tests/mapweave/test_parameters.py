@@ -80,7 +80,7 @@ MEASURED: dict[str, dict[str, object]] = {
     "MultiviewIcpParameters": {"scales": (0.15, 0.1, 0.06, 0.04, 0.04), "noise": 0.1},
     "ObservationParameters": {
         "max_range": math.inf,
-        "min_range": 0.0,
+        "min_range": 0.02,
         "masks": (),
         "max_gap": 0.5,
         "spacing": 0.2,
@@ -302,6 +302,15 @@ def test_readings_nearer_than_the_sensors_least_range_are_no_returns() -> None:
     seen = observe(scan, ObservationParameters.of(Config(sensor=Sensor(range_min=near)))).scan
     np.testing.assert_array_equal(seen.hits, scan.ranges >= near)
     np.testing.assert_array_equal(seen.ranges[seen.hits], scan.ranges[seen.hits])
+
+
+def test_readings_within_two_centimetres_are_codes_of_what_went_wrong_unless_it_is_said() -> None:
+    ranges = np.array([2.0, 0.007, 2.0, 0.019, 2.0, 0.02, 2.0, 2.0, 2.0, 2.0])
+    scan = Scan(ranges, np.linspace(-0.2, 0.2, 10))
+    seen = observe(scan, ObservationParameters.of(Config())).scan
+    np.testing.assert_array_equal(seen.hits, ranges >= 0.02)
+    told = observe(scan, ObservationParameters.of(Config(sensor=Sensor(range_min=0.0)))).scan
+    assert told.hits.all()
 
 
 @pytest.mark.parametrize(

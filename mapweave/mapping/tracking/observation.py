@@ -130,7 +130,7 @@ class Observation:
 def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     """Approximate `scan` with segments, and orient its returns (paper, V, the first step)."""
     p = parameters
-    scan = _measured(scan, p)
+    scan = measured(scan, p)
     found = extract_segments(scan, p.segments)
     oriented, between = scan_points(scan, found, p.sight, p.spacing)
     walls = join_points([oriented, between])
@@ -138,7 +138,7 @@ def observe(scan: Scan, parameters: ObservationParameters) -> Observation:
     return Observation(scan, found, oriented, walls, loose, p.max_gap)
 
 
-def _measured(scan: Scan, parameters: ObservationParameters) -> Scan:
+def measured(scan: Scan, parameters: ObservationParameters) -> Scan:
     """Return `scan` with no return for each reading that is none of what is around the robot."""
     p = parameters
     with np.errstate(invalid="ignore"):

@@ -145,3 +145,20 @@ def test_the_case_of_a_body_of_120_degrees_is_mapped_as_the_drive_without_it() -
         [(index, placed[name])] = tracks(robot_map)
         assert index == list(range(12))
     np.testing.assert_allclose(placed["body"], placed["clean"], atol=0.05)
+
+
+def test_codes_of_what_went_wrong_are_no_body_and_part_no_wall(rng: np.random.Generator) -> None:
+    clean = scans_at(walls_of(BUILDING), TOUR, 0.1)
+    lost = [rng.random(len(scan.ranges)) < 0.1 for scan in clean]  # strewn over the walls
+    for gone in lost:
+        gone[60:80] = True  # and side by side, as a body is
+    said: list[str] = []
+    mapped = []
+    for written in (np.nan, 0.007):
+        mapper = Mapper("a", on_warning=said.append)
+        for scan, gone in zip(clean, lost, strict=True):
+            mapper.add(replace(scan, ranges=np.where(gone, written, scan.ranges)))
+        mapped.append(mapper.finish())
+    assert not said
+    without, coded = ([poses for _, poses in tracks(each)] for each in mapped)
+    np.testing.assert_array_equal(np.vstack(coded), np.vstack(without))
