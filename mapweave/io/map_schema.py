@@ -75,11 +75,11 @@ class _LinesFile(FileModel):
             free_space=tuple(np.array(polygon, dtype=np.float64) for polygon in free_space),
         )
 
-
     def have_length(self) -> BoolArray:
-        """Tell of each segment whether it has a direction; the others, of one point, are no wall."""
+        """Tell of each segment whether it has a length; a point is no wall."""
         segments = self._segments()
-        return np.any(segments[:, :2] != segments[:, 2:], axis=1)
+        kept: BoolArray = np.any(segments[:, :2] != segments[:, 2:], axis=1)
+        return kept
 
     def _segments(self) -> FloatArray:
         return np.array(_flat(self.polylines), dtype=np.float64).reshape(-1, 4)
