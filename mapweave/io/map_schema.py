@@ -76,9 +76,10 @@ class _LinesFile(FileModel):
         )
 
     def have_length(self) -> BoolArray:
-        """Tell which segments have a direction; the others, of one point, are no wall."""
+        """Tell of each segment whether it has a length; a point is no wall."""
         segments = self._segments()
-        return np.asarray(np.any(segments[:, :2] != segments[:, 2:], axis=1))
+        kept: BoolArray = np.any(segments[:, :2] != segments[:, 2:], axis=1)
+        return kept
 
     def _segments(self) -> FloatArray:
         return np.array(_flat(self.polylines), dtype=np.float64).reshape(-1, 4)

@@ -9,7 +9,12 @@ from typing import Any
 
 from mapweave.errors import FileError
 from mapweave_fusion_server.storage.database import DamagedError, Database
-from mapweave_fusion_server.storage.schema import MESSAGE_TABLES, checksum, create
+from mapweave_fusion_server.storage.schema import (
+    MESSAGE_TABLES,
+    SCHEMA_VERSION,
+    checksum,
+    create,
+)
 
 COLUMNS = {
     "version": "number, created, message, checksum, covers",
@@ -36,8 +41,12 @@ def is_sound(database: Database) -> bool:
     Messages are compared with their checksums where they are read, each for itself.
     """
     try:
-        checks = ["quick_check(1)", *(f"integrity_check({table})" for table in INDEXED)]
-        if any(database.rows(f"PRAGMA {check}") != [("ok",)] for check in checks):
+        if database.rows("PRAGMA quick_check(1)") != [("ok",)]:
+            return False
+        if database.rows("PRAGMA user_version") != [(SCHEMA_VERSION,)]:
+            return True  # it has other tables until it is brought up
+        checks = [database.rows(f"PRAGMA integrity_check({table})") for table in INDEXED]
+        if any(check != [("ok",)] for check in checks):
             return False
         return not any(map(partial(_has_what_it_cannot_be, database), MESSAGE_TABLES))
     except DamagedError:

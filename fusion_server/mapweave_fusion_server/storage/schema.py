@@ -116,7 +116,9 @@ def is_missing(path: Path) -> bool:
     if int.from_bytes(header[68:72], "big") != APPLICATION_ID:
         raise FileError(path, "not a mapweave store, but another program's SQLite file")
     if not OLDEST_SCHEMA <= (schema := int.from_bytes(header[60:64], "big")) <= SCHEMA_VERSION:
-        raise FileError(path, f"a store of schema {schema}, expected {SCHEMA_VERSION}")
+        whose = "a later" if schema > SCHEMA_VERSION else "an earlier"
+        problem = f"a store of schema {schema}, of {whose} mapweave, expected {SCHEMA_VERSION}"
+        raise FileError(path, problem)
     return False
 
 

@@ -69,3 +69,17 @@ def test_what_is_news_does_not_depend_on_the_clock(tmp_path: Path) -> None:
         store.keep_map(("a", "x"), 0, 0.0, b"map")
         store.add_version(2, 2e9, b"version", seen)  # and forth: it came while it was built
         assert store.holds_news
+
+
+@pytest.mark.parametrize(("schema", "whose"), [(1, "an earlier"), (99, "a later")])
+def test_a_store_of_a_schema_unknown_here_is_left_as_it_is_and_it_says_whose(
+    tmp_path: Path, schema: int, whose: str
+) -> None:
+    path = tmp_path / "store.sqlite"
+    with Store(path, "rescue") as store:
+        store._database.rows(f"PRAGMA user_version = {schema}")
+    before = path.read_bytes()
+    for look in (StoreView, Store):
+        with pytest.raises(FileError, match=f"schema {schema}, of {whose} mapweave, expected 3$"):
+            look(path, "rescue")
+    assert path.read_bytes() == before

@@ -81,7 +81,8 @@ class LinkSettings:
         try:
             config = zenoh.Config.from_file(str(self.extra))
         except (zenoh.ZError, OSError) as error:
-            raise FileError(self.extra, f"not a configuration of Zenoh: {shown(str(error), 300)}") from error
+            problem = f"not a configuration of Zenoh: {shown(str(error), 300)}"
+            raise FileError(self.extra, problem) from error
         for path, why in OURS.items():
             if _value(config, path) != _value(zenoh.Config(), path):
                 raise FileError(self.extra, f"{path}: not to be set here: {why}")

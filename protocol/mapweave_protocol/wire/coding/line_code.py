@@ -206,15 +206,18 @@ def _classes(support: IntArray) -> IntArray:
     return np.where(support > 0, 1 + np.searchsorted(middles, support), 0)
 
 
+_TAKEN = 2**40  # farther than any that is left
+
+
 def _short_way(polylines: list[IntArray]) -> list[int]:
     """Return an order of `polylines`, each (k, 4), in which each starts near the last's end."""
-    starts = np.array([p[0, :2] for p in polylines]).reshape(-1, 2)
+    x, y = np.array([p[0, :2] for p in polylines], dtype=np.int64).reshape(-1, 2).T.copy()
     ends = [p[-1, 2:] for p in polylines]
-    left, order = np.ones(len(polylines), dtype=bool), []
-    at = np.zeros(2, dtype=np.int64)
+    order: list[int] = []
+    here_x = here_y = 0
     for _ in polylines:
-        away = np.where(left, np.abs(starts - at).sum(axis=1), np.inf)
-        nearest = int(np.argmin(away))
+        nearest = int(np.argmin(np.abs(x - here_x) + np.abs(y - here_y)))
         order.append(nearest)
-        left[nearest], at = False, ends[nearest]
+        x[nearest] = _TAKEN
+        here_x, here_y = ends[nearest]
     return order
