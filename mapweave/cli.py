@@ -112,7 +112,9 @@ def add_config_argument(parser: argparse.ArgumentParser) -> None:
 def add_topic_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--topic``: which laser of a bag."""
     parser.add_argument(
-        "--topic", metavar="TOPIC", help="the laser of a bag that has several, such as /scan"
+        "--topic",
+        metavar="TOPIC",
+        help="the laser of a bag that has several, such as /scan, or lasers, such as /front+/rear",
     )
 
 

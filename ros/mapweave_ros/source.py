@@ -14,13 +14,13 @@ from mapweave.io.readers.ros_bags.one_laser import OneLaser
 from mapweave.io.refusals import Refusals
 from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
+from mapweave.scan.several_lasers import SeveralLasers
 from mapweave_protocol.link.inbox import Arrival, Inbox
 from mapweave_ros.address import Laser, Ros2Address
 from mapweave_ros.graph import topics_of_type
 from mapweave_ros.output import open_when_there
 from mapweave_ros.robot.beside_scans import BesideScans, kind_of_odometry
 from mapweave_ros.robot.frames import RobotFrames
-from mapweave_ros.robot.several_lasers import SeveralLasers
 from mapweave_ros.scan_messages import ScanMessages
 from mapweave_ros.silence import Expected, Silence
 from mapweave_ros.topics import TopicKeys, dds_type_of

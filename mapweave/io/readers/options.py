@@ -19,7 +19,8 @@ class ReadOptions:
     angular_step
         Between beams [rad], where the file does not state it.
     topic
-        Of a bag: the laser's topic, such as ``/scan``; None takes the only one there is.
+        Of a bag: the laser's topic, such as ``/scan``, or those of several, ``/front+/rear``; None
+        takes the only one there is.
     on_warning
         Called once, after the last scan, if something was left out; of a live source, when it is.
     on_news
@@ -28,7 +29,8 @@ class ReadOptions:
         Of a bag or a ROS 2 network: where odometry is said, such as ``/odom`` or ``/tf``; None
         takes the only one of a bag, where `odometry` asks for it.
     on_laser
-        Of a bag: told before its first scan which frame the laser is in, and what is fixed to what.
+        Of a bag: told before its first scan which frame the laser is in, and what is fixed to what;
+        not of several lasers, whose views are of the middle of the robot.
     network
         Endpoints of the network that the reader is on, for sources that are on it as well.
     """

@@ -66,12 +66,15 @@ def read_scans(
         Between beams [rad], where a line does not state it (``FLASER``); None has the log's
         parameters tell, or the number of beams.
     topic
-        Of a bag: the laser's topic, such as ``/scan``; None takes the only one there is.
+        Of a bag: the laser's topic, such as ``/scan``, or those of several, ``/front+/rear``, whose
+        scans within half a period become one view from the middle of the robot; None takes the
+        only one there is.
     on_warning
         Called once, after the last scan, if something was left out, or assumed that the file does
         not say; by default a `UserWarning` says so.
     on_laser
-        Of a bag: told before its first scan which frame the laser is in, and what is fixed to what.
+        Of a bag: told before its first scan which frame the laser is in, and what is fixed to what;
+        not of several lasers.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""What is known of the robot beside one scan: its frames, its odometry, its other lasers."""
+"""What is known of the robot beside one scan: its frames, its odometry."""

@@ -1,6 +1,7 @@
 """What a bag says beside its scans: where the laser sits, and the robot's odometry."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,52 @@ def test_transforms_that_come_last_count_as_well_and_those_of_others_do_not(
     ]
     first, *_ = read_scans(write(tmp_path, "mcap", messages))
     assert first.angles[0] == pytest.approx(0.1, abs=1e-6)
+
+
+SIDES = {"/front": (0.3, 0.0), "/rear": (-0.3, math.pi)}  # metres ahead, and where each looks
+
+
+def two_lasers(store: Made, distance: float = 1.0) -> Said:
+    """A robot whose lasers see half a turn each, and everywhere the same distance."""
+    half = Laser(np.full(181, distance), angle_min=-math.pi / 2, angle_increment=math.radians(1))
+    ros1 = store is ROS1
+    fixed = [
+        transform("base_link", topic[1:], x, 0.0, turn, store=store)
+        for topic, (x, turn) in SIDES.items()
+    ]
+    scans = [
+        (topic, LASER_SCAN, replace(half, frame=topic[1:]).message(k, ros1=ros1))
+        for k in range(3)
+        for topic in SIDES
+    ]
+    return [("/tf_static", TF_MESSAGE, tf(*fixed, store=store)), *scans]
+
+
+@pytest.mark.parametrize("form", ["bag", "db3", "mcap"])
+def test_two_lasers_of_a_bag_are_one_that_sees_a_whole_turn_from_the_middle(
+    form: str, tmp_path: Path
+) -> None:
+    bag = write(tmp_path, form, two_lasers(ROS1 if form == "bag" else ROS2))
+    scans = list(read_scans(bag, topic="/front+rear"))
+    assert [scan.index for scan in scans] == [0, 1, 2]
+    assert [scan.stamp for scan in scans] == [100.25, 101.25, 102.25]
+    for scan in scans:
+        seen = scan.points[scan.hits]
+        ahead = np.where(seen[:, 0] > 0, 0.3, -0.3)
+        near = np.hypot(seen[:, 0] - ahead, seen[:, 1])
+        np.testing.assert_allclose(near, 1.0, atol=0.02)
+        assert np.ptp(np.arctan2(seen[:, 1], seen[:, 0])) > math.radians(355)
+
+
+def test_two_lasers_need_to_be_known_where_they_sit_and_are_named_once(tmp_path: Path) -> None:
+    bag = write(tmp_path, "mcap", two_lasers(ROS2)[1:])
+    with pytest.raises(FileError, match=r"several lasers, .* with --topic, or all: /front\+/rear"):
+        list(read_scans(bag))
+    with pytest.raises(FileError, match="says where the laser of /front sits, in frame 'front'"):
+        list(read_scans(bag, topic="/front+/rear"))
+    with pytest.raises(FileError, match=r"no laser scans on topic /left; there are /front \(3"):
+        list(read_scans(bag, topic="/front+/left"))
+    assert len(list(read_scans(bag, topic="/front+/front"))) == 3
 
 
 def test_a_tilted_laser_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -6,12 +6,12 @@ each format brings a walk through what there is that needs no index.
 
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 from mapweave.errors import FileError, MissingExtraError
 from mapweave.io.readers.options import ReadOptions
@@ -24,7 +24,9 @@ from mapweave.io.readers.ros_bags.laser_messages import (
 )
 from mapweave.io.readers.ros_bags.one_laser import OneLaser
 from mapweave.io.readers.tally import Tally
+from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
+from mapweave.scan.several_lasers import SeveralLasers
 
 EXPECTED = "expected a ROS bag (.bag, .db3 or .mcap) with sensor_msgs/LaserScan"
 CUT_OFF = "is cut off or was not closed"
@@ -72,8 +74,8 @@ class Bag(Protocol):
     def lasers(self) -> dict[str, int]:
         """Return how many messages each laser topic has."""
 
-    def scans(self, topic: str) -> Iterator[Message]:
-        """Yield the messages of a laser topic, in the order in which they were recorded."""
+    def scans(self, topics: Collection[str]) -> Iterator[Message]:
+        """Yield the messages of laser topics, in the order in which they were recorded."""
 
     def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
         """Yield the messages of a type at topics with this `ending`, in that order."""
@@ -95,12 +97,12 @@ class WholeBag:
                 counts[connection.topic] += connection.msgcount
         return dict(counts)
 
-    def scans(self, topic: str) -> Iterator[Message]:
+    def scans(self, topics: Collection[str]) -> Iterator[Message]:
         """As of `Bag`."""
         chosen = [
             connection
             for connection in self.reader.connections
-            if connection.msgtype in LASER_SCANS and connection.topic == topic
+            if connection.msgtype in LASER_SCANS and connection.topic in topics
         ]
         yield from self._messages(chosen)
 
@@ -126,9 +128,9 @@ class CutBag:
         """As of `Bag`."""
         return dict(Counter(message.topic for message in self._of_types(LASER_SCANS)))
 
-    def scans(self, topic: str) -> Iterator[Message]:
+    def scans(self, topics: Collection[str]) -> Iterator[Message]:
         """As of `Bag`."""
-        return (message for message in self._of_types(LASER_SCANS) if message.topic == topic)
+        return (message for message in self._of_types(LASER_SCANS) if message.topic in topics)
 
     def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
         """As of `Bag`."""
@@ -160,10 +162,10 @@ class SplitBag:
             counts.update(part.lasers())
         return dict(counts)
 
-    def scans(self, topic: str) -> Iterator[Message]:
+    def scans(self, topics: Collection[str]) -> Iterator[Message]:
         """As of `Bag`."""
         for part in self.parts:
-            yield from part.scans(topic)
+            yield from part.scans(topics)
 
     def of_type(self, kind: str, ending: str = "") -> Iterator[Message]:
         """As of `Bag`."""
@@ -208,38 +210,71 @@ def damage_errors() -> tuple[type[Exception], ...]:
 
 
 def read_bag(path: Path, bag_format: BagFormat, options: ReadOptions) -> Iterator[Scan]:
-    """Yield the scans of one topic of the bag at `path`; parameters and errors as `read_scans`."""
+    """Yield the scans of a laser of the bag at `path`; parameters and errors as `read_scans`."""
     with ExitStack() as stack:
         yield from read_open_bag(path, open_bag(path, bag_format, stack), options)
 
 
 def read_open_bag(path: Path, bag: Bag, options: ReadOptions) -> Iterator[Scan]:
-    """Yield the scans of one topic of a bag, which is open."""
+    """Yield the scans of a laser of a bag, which is open, or of several as one."""
     tally = Tally("message", EXPECTED, cut_off=bag.cut_off)
     decoder = LaserDecoder()
-    topic = choose_topic(path, bag, options.topic)
+    topics = choose_topics(path, bag, options.topic)
     beside = BesideScans.of(path, partial(_whole_of_type, bag), decoder, options, tally.assume)
-    laser = OneLaser()
+    taken = _taken(bag, topics, decoder, tally)
+    alone = len(topics) == 1
     try:
-        for message in _sound(bag.scans(topic), tally):
-            tally.pieces += 1
-            try:
-                frame, measured = decoder.framed_scan(message, tally.scans)
-            except UnreadableMessageError as error:
-                tally.add_damaged(tally.pieces, error)
-                continue
-            if not laser.has_taken(frame, measured.stamp):
-                tally.assume(f"what {topic} has in frame {frame!r} is of another laser, left out")
-                continue
-            scan = beside.completed(frame, measured)
-            if options.on_laser is not None and not tally.scans:
-                options.on_laser(frame, beside.frames)
+        for scan in _alone(taken, beside, options) if alone else _together(taken, topics, beside):
             tally.add_scan(scan)
             yield scan
         if problem := tally.problem():
             raise FileError(path, problem)
     finally:  # also where nobody wants the rest
         tally.warn(path, options)
+
+
+_Taken: TypeAlias = tuple[str, str, Scan]
+"""A topic, the frame of its laser, and a scan."""
+
+
+def _taken(
+    bag: Bag, topics: Sequence[str], decoder: LaserDecoder, tally: Tally
+) -> Iterator[_Taken]:
+    """Yield the whole scans of one laser of each topic."""
+    lasers = {topic: OneLaser() for topic in topics}
+    for message in _sound(bag.scans(topics), tally):
+        tally.pieces += 1
+        topic = message.topic
+        try:
+            frame, scan = decoder.framed_scan(message, tally.scans)
+        except UnreadableMessageError as error:
+            tally.add_damaged(tally.pieces, error)
+            continue
+        if lasers[topic].has_taken(frame, scan.stamp):
+            yield topic, frame, scan
+        else:
+            tally.assume(f"what {topic} has in frame {frame!r} is of another laser, left out")
+
+
+def _alone(taken: Iterator[_Taken], beside: BesideScans, options: ReadOptions) -> Iterator[Scan]:
+    """Yield the scans of one laser as the robot has them."""
+    for number, (_, frame, scan) in enumerate(taken):
+        completed = beside.completed(frame, scan)
+        if options.on_laser is not None and not number:
+            options.on_laser(frame, beside.frames)
+        yield completed
+
+
+def _together(
+    taken: Iterator[_Taken], topics: Sequence[str], beside: BesideScans
+) -> Iterator[Scan]:
+    """Yield the scans of several lasers as those of one that sits in the middle of the robot."""
+    mountings = dict.fromkeys(topics, Mounting())
+    together = SeveralLasers(mountings)
+    for topic, frame, scan in taken:
+        mountings[topic] = beside.mounting_needed(topic, frame)
+        for view in together.add(topic, scan):
+            yield beside.with_odometry(view, Mounting())
 
 
 def _whole_of_type(bag: Bag, kind: str, ending: str = "") -> Iterator[Message]:
@@ -258,8 +293,8 @@ def _sound(messages: Iterator[Message], tally: Tally) -> Iterator[Message]:
         tally.cut_off = f"cannot be read any further ({error})"
 
 
-def choose_topic(path: Path, bag: Bag, asked: str | None) -> str:
-    """Return the laser topic to read: the one asked for, else the only one.
+def choose_topics(path: Path, bag: Bag, asked: str | None) -> tuple[str, ...]:
+    """Return the laser topics to read: those asked for, joined by ``+``, else the only one.
 
     Raises
     ------
@@ -273,9 +308,19 @@ def choose_topic(path: Path, bag: Bag, asked: str | None) -> str:
         raise FileError(path, f"{cut_off}holds no laser scan; {EXPECTED}")
     if asked is None:
         if len(lasers) > 1:
-            raise FileError(path, f"has several lasers, {listed}; name one with --topic")
-        return next(iter(lasers))
-    for topic in lasers:
-        if topic.strip("/") == asked.strip("/"):
-            return topic
-    raise FileError(path, f"has no laser scans on topic {asked}; there are {listed}")
+            every = "+".join(lasers)
+            raise FileError(
+                path, f"has several lasers, {listed}; name one with --topic, or all: {every}"
+            )
+        return tuple(lasers)
+    found = {
+        name: next((t for t in lasers if _is_same(t, name)), None) for name in asked.split("+")
+    }
+    for name, topic in found.items():
+        if topic is None:
+            raise FileError(path, f"has no laser scans on topic {name}; there are {listed}")
+    return tuple(dict.fromkeys(topic for topic in found.values() if topic is not None))
+
+
+def _is_same(topic: str, name: str) -> bool:
+    return topic.strip("/") == name.strip("/")

@@ -78,18 +78,41 @@ class BesideScans:
 
     def completed(self, frame: str, scan: Scan) -> Scan:
         """Return `scan`, taken in `frame`, as the robot has it, with the odometry of its moment."""
+        mounting = self._mounting(frame) or Mounting()
+        return self.with_odometry(mounting.turned(scan), mounting)
+
+    def with_odometry(self, scan: Scan, mounting: Mounting) -> Scan:
+        """Return `scan`, turned as the robot is, with the odometry of its moment where it was."""
+        robot = None if self.odometry is None else self.odometry.at(scan.stamp)
+        if robot is None:
+            return scan
+        # Turned as the robot is, but where the laser is.
+        return replace(scan, odometry=se2.compose(robot, [mounting.x, mounting.y, 0.0]))
+
+    def mounting_needed(self, topic: str, frame: str) -> Mounting:
+        """Return where one of several lasers sits, which has to be known.
+
+        Raises
+        ------
+        FileError
+            If it is not, or the laser does not look level.
+        """
+        found = self._mounting(frame)
+        if found is None:
+            raise FileError(
+                self.path,
+                f"nothing on {TF_STATIC} says where the laser of {topic} sits, in frame {frame!r};"
+                " name one laser with --topic",
+            )
+        return found
+
+    def _mounting(self, frame: str) -> Mounting | None:
         try:
-            mounting = self.frames.mounting(frame) or Mounting()
+            return self.frames.mounting(frame)
         except TiltedError as error:
             raise FileError(
                 self.path, f"the laser in frame {frame!r} {error}; expected one that looks level"
             ) from error
-        turned = mounting.turned(scan)
-        robot = None if self.odometry is None else self.odometry.at(scan.stamp)
-        if robot is None:
-            return turned
-        # Turned as the robot is, but where the laser is.
-        return replace(turned, odometry=se2.compose(robot, [mounting.x, mounting.y, 0.0]))
 
 
 def _odometry(

@@ -4,7 +4,7 @@ import numpy as np
 
 from mapweave.scan.mounting import Mounting
 from mapweave.scan.scan import Scan
-from mapweave_ros.robot.several_lasers import SeveralLasers
+from mapweave.scan.several_lasers import SeveralLasers
 
 ANGLES = np.radians(np.arange(-90.0, 91.0))
 SIDES = {"/left": Mounting(0.0, 0.3, np.pi / 2), "/right": Mounting(0.0, -0.3, -np.pi / 2)}
