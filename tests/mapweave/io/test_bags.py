@@ -52,7 +52,7 @@ def reindex(path: Path, kinds: IndexType, *, statistics: bool) -> None:
         topic = writer.register_channel(channel.topic, channel.message_encoding, number)
         for _, _, message in found:
             writer.add_message(topic, message.log_time, message.data, message.publish_time)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def cut(path: Path, size: int) -> Path:

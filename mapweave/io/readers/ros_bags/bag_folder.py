@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from mapweave.errors import FileError
 from mapweave.io.readers.options import ReadOptions
@@ -41,7 +42,7 @@ def _open(path: Path, stack: ExitStack) -> Bag:
         from rosbags.rosbag2 import Reader
 
         try:
-            reader = stack.enter_context(Reader(path))
+            reader: Any = stack.enter_context(Reader(path))
             if not parts or all(map(mcap.is_indexed, reader.storage.storages)):
                 return WholeBag(reader, CDR)
         except damage_errors() as error:
