@@ -1,9 +1,10 @@
 """Folders of ROS 2 bags: files in SQLite or MCAP, and ``metadata.yaml``, where it was written."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from mapweave.errors import FileError
 from mapweave.io.readers.options import ReadOptions
@@ -41,9 +42,8 @@ def _open(path: Path, stack: ExitStack) -> Bag:
         from rosbags.rosbag2 import Reader
 
         try:
-            reader = stack.enter_context(Reader(path))
-            files: Sequence[object] = getattr(reader.storage, "storages", ())
-            if not parts or all(map(mcap.is_indexed, files)):
+            reader: Any = stack.enter_context(Reader(path))
+            if not parts or all(map(mcap.is_indexed, reader.storage.storages)):
                 return WholeBag(reader, CDR)
         except damage_errors() as error:
             if not parts:
