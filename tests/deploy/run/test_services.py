@@ -134,6 +134,12 @@ def test_the_image_is_of_the_wheel_and_does_not_run_as_root() -> None:
     last = max(n for n, line in enumerate(lines) if line.startswith("FROM"))
     assert [line for line in lines[last:] if line.startswith("USER")] == ["USER mapweave"]
     assert any("mapweave-*.whl" in line for line in lines[:last])
+    # One Python in both stages, and it can be said: a wheel is of the one that made it.
+    assert {line.split()[1] for line in lines if line.startswith("FROM")} == {
+        "python:${PYTHON}-slim-bookworm"
+    }
+    assert lines.index("ARG PYTHON=3.11") < lines.index("FROM python:${PYTHON}-slim-bookworm")
+    assert _compose()["services"]["router"]["build"]["args"] == {"PYTHON": "${PYTHON:-3.11}"}
     assert 'ENTRYPOINT ["mapweave"]' in lines
 
 
