@@ -112,7 +112,7 @@ def _overwritten(path: Path) -> None:
          "not a mapweave store"),
         (lambda path: path.write_bytes(b"SQLite"), "not a mapweave store"),
         (_foreign_database, "another program's"),
-        (_later_schema, "schema 99, expected 3"),
+        (_later_schema, "schema 99, of a later mapweave, expected 3"),
         (_cut_off, "damaged"),
         (_overwritten, "damaged"),
     ],

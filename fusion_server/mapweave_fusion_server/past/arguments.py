@@ -78,8 +78,10 @@ def judgement(alignment: Alignment) -> str:
     return f"{alignment.decision}, {alignment.status.kind.value.replace('_', ' ')}"
 
 
-def tell_time(seconds: float) -> str:
+def tell_time(seconds: float | None) -> str:
     """Return a time [s since 1970] for a person."""
+    if seconds is None:
+        return "unknown"
     try:
         return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S")
     except (ValueError, OverflowError, OSError):  # a clock that says nothing

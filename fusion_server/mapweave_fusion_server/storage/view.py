@@ -1,5 +1,6 @@
 """A store that is looked at, by another process than the coordinator, which may go on."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +23,10 @@ NO_FILE = 0
 
 @dataclass(frozen=True, slots=True)
 class VersionEntry:
-    """A version: its number, when it was begun [s since 1970], and its bytes."""
+    """A version: its number, when it was begun [s since 1970; None if damaged], and its bytes."""
 
     number: int
-    created: float
+    created: float | None
     size: int
 
 
@@ -80,7 +81,7 @@ class StoreView:
             "SELECT number, created, length(message) FROM version ORDER BY number DESC LIMIT ?",
             limit,
         )
-        return [VersionEntry(int(n), float(t), int(size)) for n, t, size in reversed(rows)]
+        return [VersionEntry(int(n), _time(t), int(size or 0)) for n, t, size in reversed(rows)]
 
     def version(self, number: int) -> bytes:
         """Return the message of version `number`.
@@ -168,6 +169,10 @@ class StoreView:
         if team is not None and owners and team not in owners:
             problem = f"the store of team {', '.join(owners)!r}, expected team {team!r}"
             raise FileError(self.path, problem)
+
+
+def _time(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
 def _may_be_replaced(path: Path) -> bool:

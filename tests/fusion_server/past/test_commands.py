@@ -76,6 +76,23 @@ def test_history_lists_versions_with_when_and_who(run: Run) -> None:
     assert [line.split()[0] for line in run("history", "--limit", "1")] == ["3"]
 
 
+@pytest.mark.parametrize("time", ["'abc'", "9e999", "x'00ff'"])
+def test_a_time_that_is_damaged_is_unknown_and_the_rest_is_listed(
+    time: str, path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Store(path, "rescue") as store:
+        for joint in JOINTS:
+            message = encode(JointMapMessage.pack(joint, store.series))
+            store.add_version(joint.version, 86400.0 * joint.version, message)
+        store._database.rows(f"UPDATE version SET created = {time} WHERE number = 2")
+    assert main(["history", "--store", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[1] for line in lines] == ["1970-01-02", "unknown", "1970-01-04"]
+    assert main(["history", "--store", str(path), "--json"]) == 0
+    told = [json.loads(line)["created"] for line in capsys.readouterr().out.splitlines()]
+    assert told == [86400.0, None, 3 * 86400.0]
+
+
 def test_history_is_there_for_programs(run: Run) -> None:
     last = json.loads(run("history", "--json")[-1])
     assert last["version"] == 3
