@@ -58,6 +58,8 @@ class FinishedSubmap:
         Whether it was tracked from the submap before it.
     spare
         The number of a component, if another one is needed.
+    parameters
+        To settle it with: those of all submaps of a run.
     """
 
     submap: Submap
@@ -65,6 +67,7 @@ class FinishedSubmap:
     growing: SubmapBuilder
     follows: bool
     spare: int
+    parameters: BackendParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,9 +123,18 @@ class BackendRunner(Protocol):
 
 
 class Backend:
-    """Settles at once, where it is called; `known` are submaps to go on from, ids from 0."""
+    """Settles at once, where it is called; `known` are submaps to go on from, ids from 0.
+
+    With the parameters of the first submap: by then a lidar may have been found to be noisy.
+    """
 
     def __init__(self, parameters: BackendParameters, known: Sequence[Submap] = ()) -> None:
+        self._known = tuple(known)
+        self._settled: BackendResult | None = None
+        self._begin_with(parameters)
+
+    def _begin_with(self, parameters: BackendParameters) -> None:
+        known = self._known
         self._parameters = parameters
         self._submaps = list(known)
         self._component_merger = ComponentMerger(parameters.component_merging, len(known))
@@ -131,7 +143,6 @@ class Backend:
         self._loops.graph.take_over(known)
         self._kidnap_detector = KidnapDetector(parameters.kidnapping)
         self._tracked = 0  # how many of the last submaps were tracked from one another
-        self._settled: BackendResult | None = None
 
     def begin(self, finished: FinishedSubmap) -> None:
         """Settle the next submap."""
@@ -148,6 +159,8 @@ class Backend:
 
     def settle(self, finished: FinishedSubmap) -> BackendResult:
         """Join, close, refine and merge again."""
+        if finished.parameters != self._parameters:
+            self._begin_with(finished.parameters)
         count = len(self._submaps)
         submaps = [*self._submaps, finished.submap]
         if finished.follows and count:

@@ -5,6 +5,7 @@ nowhere waits; when several in a row fit nowhere or are blind, the robot is lost
 component.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
@@ -41,6 +42,7 @@ from mapweave.mapping.tracking.tracker import Found, Tracker, TrackerParameters
 from mapweave.maps import LineMap, MadeWith, RobotMap, Submap
 from mapweave.parameters import StageParameters, derived
 from mapweave.scan.own_body import OwnBody, OwnBodyParameters
+from mapweave.scan.range_noise import RangeNoise
 from mapweave.scan.scan import UNNUMBERED, Scan
 
 AT_ONCE = 2  # scans that wait are placed with each one that comes: a loss holds nobody up
@@ -125,6 +127,9 @@ class Mapper:
         self.parameters = parameters or MapperParameters.of(config)
         as_configured = self.parameters == MapperParameters.of(config)
         self._made_with = MadeWith.of(config) if as_configured else None
+        self._config = config
+        says = as_configured and "range_sigma" not in config.sensor.model_fields_set
+        self._noise = RangeNoise(config.sensor.range_sigma if says else math.inf)
         self._version = 0
         self._finished = list(to_continue(known))
         self._known = len(self._finished)  # submaps, of an earlier run
@@ -185,7 +190,8 @@ class Mapper:
         check_kind("scan", scan, Scan)
         scan = measured(self._numbered(scan), self.parameters.observation)
         finished = len(self._finished)
-        if self._body.watch(scan) or self._sweeps.take_news():
+        is_noisy = self._notice_noise(scan)
+        if self._body.watch(scan) or self._sweeps.take_news() or is_noisy:
             self._judge_again()
         placed, lost = self._take_next(scan)
         pose, uncertainty = self._whereabouts() if placed else (None, None)
@@ -332,6 +338,24 @@ class Mapper:
         self._merged = {}
         self._version += 1
 
+    def _notice_noise(self, scan: Scan) -> bool:
+        """Tell whether readings scatter far more than is assumed, and have all made for that."""
+        sigma = self._noise.watch(scan)
+        if sigma is None or self._has_finished:
+            return False
+        assumed = self._config.sensor.range_sigma
+        sensor = self._config.sensor.model_copy(update={"range_sigma": sigma})
+        self._config = self._config.model_copy(update={"sensor": sensor})
+        self.parameters = MapperParameters.of(self._config)
+        self._made_with = MadeWith.of(self._config)
+        self._body = OwnBody(self.parameters.own_body)
+        self._sweeps = SweepJudge(self.parameters.sweeps)
+        self._say_once(
+            f"readings of {self.robot} scatter by {sigma:.3f} m along walls, and {assumed:g} m are"
+            " assumed of a lidar: mapped as such a one (range_sigma of [sensor] says it at once)"
+        )
+        return True
+
     def _say_body(self) -> None:
         """Tell once that the robot sees itself."""
         if self._body.reach.any():
@@ -420,7 +444,14 @@ class Mapper:
         scans = tuple(self._merged[k] for k in submap.trajectory.scan_index.tolist())
         self._finished.append(submap)
         self._unsettled.append(
-            FinishedSubmap(submap, scans, self._growing, self._follows, self._spare())
+            FinishedSubmap(
+                submap,
+                scans,
+                self._growing,
+                self._follows,
+                self._spare(),
+                self.parameters.backend,
+            )
         )
         self._follows = True
         self._tracker.drift.mark()
