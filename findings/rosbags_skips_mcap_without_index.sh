@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # rosbags 0.11.9: of an MCAP whose chunks have no message index it tells all messages and reads none.
 #
-# Expected: in MCAP an index is optional. For each chunk the summary lists where in the file the index of each
-# channel is, and of an empty list the format says that no index is available: nothing about what
-# the chunk holds. So it is to be opened. ROS 2's recorder writes such files where its storage configuration says
-# `noMessageIndex: true`, to spare time and space, and the format's own writers do by an option.
+# Expected: in MCAP an index is optional. For each chunk the summary lists where the index of each of
+# its channels is, and of an empty list the format says that no index is available: nothing about
+# what the chunk holds, so it is to be opened. ROS 2's recorder writes such files where its storage
+# configuration says `noMessageIndex: true`, and the format's own writers by an option.
 #
-# What happens: an empty list is taken for a chunk without messages of the topics asked for, and every chunk
-# is passed over. The count of messages, the duration and what each topic holds are taken from the statistics and
-# right, so all that is printed of the bag looks sound; the loop over its messages ends at once, and
-# nothing is raised or logged. A run over many bags has one empty map. The format's own reader gets all of
-# it, and so does rosbags where the summary lists no chunks, or where there are none.
+# What happens: an empty list is taken for a chunk without messages of the topics asked for, and every
+# chunk is passed over. The count of messages, the duration and what each topic holds are taken from
+# the statistics and right, so all that is printed of the bag looks sound; the loop over its messages
+# ends at once, and nothing is raised or logged. In a run over many bags one map is empty. The format's
+# own reader gets all of it, and so does rosbags where chunks are not listed, or where there are none.
 #
 # Seen (ten scans, told by rosbags, read by it, and read by mcap):
 #   with all indexes       told 10, read 10, by mcap 10

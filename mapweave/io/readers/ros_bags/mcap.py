@@ -20,6 +20,7 @@ _NUMBER = struct.Struct("<H")
 _LENGTH = struct.Struct("<I")
 _MESSAGE_HEAD = 22  # bytes: channel, sequence and two times, before the data
 _CHUNK_HEAD = 28  # bytes: two times, the size and the checksum, before the name of the compression
+_NO_SCHEMA = "__schemaless__"  # what `rosbags` calls the type of a channel that tells none
 _LARGEST = 1 << 28  # [bytes] of a record, unpacked; recorders close a chunk at some megabytes
 
 
@@ -54,12 +55,18 @@ def open_whole(path: Path) -> Iterator[Any]:
 
 
 def is_indexed(reader: object) -> bool:
-    """Tell whether an index says of each chunk of an opened file what is in it.
+    """Tell whether the end of an opened file says what is in it: topics, types, and of each chunk.
 
-    The format leaves that to the recorder (`noMessageIndex` in ROS 2); `rosbags` takes a chunk of
-    which nothing is said for one that holds nothing.
+    The format leaves most of that to the recorder (`noMessageIndex`, `noRepeatedChannels` and more
+    in ROS 2); for `rosbags`, what is not told there is not there. SQLite's files, which a folder
+    may hold as well, always tell.
     """
-    return all(chunk.message_index_offsets for chunk in getattr(reader, "chunks", ()))
+    chunks = getattr(reader, "chunks", None)
+    if chunks is None:
+        return True
+    types = {connection.msgtype for connection in getattr(reader, "connections", ())}
+    told = bool(types) and _NO_SCHEMA not in types
+    return told and all(chunk.message_index_offsets for chunk in chunks)
 
 
 def walk(path: Path) -> Iterator[Message]:
