@@ -111,7 +111,7 @@ def _run(options: argparse.Namespace) -> int:
         nullcontext() if feed is None else feed.positions.heard_on(session, team),
     ):
         gc.freeze()  # what was loaded stays: collections, in which all waits, need not look at it
-        Service(session, team, store, parameters, config, feed).run(StopSignals())
+        Service(session, team, store, parameters, config, feed, link).run(StopSignals())
     return 0
 
 

@@ -29,6 +29,7 @@ from mapweave_protocol.link.inbox import (
     status_reader,
 )
 from mapweave_protocol.link.lacking import Lacking
+from mapweave_protocol.link.security.proof import Check, unchecked
 from mapweave_protocol.narration.attendance import Attendance
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire.codec import decode, encode
@@ -76,9 +77,17 @@ class Intake:
         Where the news goes.
     story
         Turns what happens into lines for the log.
+    check_order
+        Raises `MessageError` for an order of which nothing proves who gave it.
     """
 
-    def __init__(self, coordinator: Coordinator, store: Store, story: Story) -> None:
+    def __init__(
+        self,
+        coordinator: Coordinator,
+        store: Store,
+        story: Story,
+        check_order: Check = unchecked,
+    ) -> None:
         self._coordinator = coordinator
         self._store = store
         self._story = story
@@ -91,6 +100,7 @@ class Intake:
         self._marks = marks_reader(self.refusals)
         self._orders = order_reader(self.refusals)
         self._held_orders = held_orders_reader(self.refusals)
+        self._check_order = check_order
         self._heard: dict[Run, StatusMessage] = {}
         self._last_heard: dict[str, float] = {}
         self._lacking = Lacking(ASKED_AFTER)
@@ -196,14 +206,25 @@ class Intake:
         elif self._orders.reads(arrival):
             order = self._orders.read(arrival)
             if order is not None:
-                self.take_order(order, received)
+                self._take_order_of(arrival.key, order, received)
         elif self._held_orders.reads(arrival):
             held = self._held_orders.read(arrival)
             for order in held.orders if held is not None else ():
-                self.take_order(order, received)
+                self._take_order_of(arrival.key, order, received)
         else:
             return False
         return True
+
+    def _take_order_of(self, key: str, order: OrderMessage, received: float) -> None:
+        """Take an order that came under `key`, if it proves who gave it; one held is no news."""
+        if self._coordinator.orders.holds(order.id):
+            return
+        try:
+            self._check_order(order)
+        except MessageError as error:
+            self._orders.refuse(key, error)
+        else:
+            self.take_order(order, received)
 
     def take_order(self, order: OrderMessage, received: float) -> None:
         """Take an operator's order, which came at `received` [s since 1970]."""

@@ -25,6 +25,8 @@ from mapweave_protocol.link.asking import ITS_STATUS, request_all_of, request_or
 from mapweave_protocol.link.assembler import MESSAGES_TO_COMPLETE
 from mapweave_protocol.link.inbox import Inbox
 from mapweave_protocol.link.joint_changes import JointSender
+from mapweave_protocol.link.security.proof import checking, signing
+from mapweave_protocol.link.security.settings import LinkSettings
 from mapweave_protocol.link.status_schedule import COORDINATOR_INTERVAL, StatusSchedule
 from mapweave_protocol.narration.story import Story
 from mapweave_protocol.wire import keys
@@ -59,11 +61,15 @@ class Service:
         Of how maps become one; the default one where none is given.
     feed
         Is handed every version, and every second how robots and coordinator are.
+    link
+        With keys, orders of others are taken only if signed, and those of the page are signed.
 
     Raises
     ------
     FileError
-        If the store holds something unreadable.
+        If the store holds something unreadable, or keys cannot be used.
+    MissingExtraError
+        If there are keys, and what checks signatures is not installed.
     """
 
     def __init__(
@@ -74,6 +80,7 @@ class Service:
         parameters: CoordinatorParameters,
         config: Config | None = None,
         feed: Feed | None = None,
+        link: LinkSettings | None = None,
     ) -> None:
         self._session = zenoh_session
         self._team = team
@@ -84,8 +91,10 @@ class Service:
             deque(self._story.joined(latest), maxlen=0)  # it was told before this start
         self._frames = frames_of(latest)
         self._coordinator = Coordinator(parameters, latest, store.latest_version)
-        self._intake = Intake(self._coordinator, store, self._story)
+        link = link or LinkSettings()
+        self._intake = Intake(self._coordinator, store, self._story, checking(link))
         self._intake.restore()
+        self._sign = signing(link)
         self._inbox = Inbox()
         self._joints = JointSender()
         self._boot = keys.new_boot()
@@ -141,7 +150,7 @@ class Service:
 
     def _take_orders_of_page(self) -> None:
         """Take what was ordered on the live page, and say it to those who keep orders as well."""
-        for order in self._feed.orders():
+        for order in map(self._sign, self._feed.orders()):
             self._intake.take_order(order, time.time())
             key = keys.ORDER.build(team=self._team, name=order.by, order=str(order.kind))
             self._session.put(key, encode(order))

@@ -38,6 +38,10 @@ class OrderLedger:
         """Whether no other one is taken."""
         return len(self._orders) >= MAX_ORDERS
 
+    def holds(self, identity: str) -> bool:
+        """Tell whether the order of an id is held."""
+        return identity in self._orders
+
     def take(self, order: OrderMessage) -> bool:
         """Take in an order; return whether it is news: it was not held, and there is room."""
         if order.id in self._orders or self.is_full:

@@ -18,6 +18,7 @@ from mapweave.maps import parse_component
 from mapweave.orders import MAX_REASON
 from mapweave_protocol.link.arguments import add_connection_arguments, connection_of
 from mapweave_protocol.link.security.membership import operator_of
+from mapweave_protocol.link.security.proof import Sign, signing
 from mapweave_protocol.link.session import open_session
 from mapweave_protocol.operator.delivery import PATIENCE
 from mapweave_protocol.wire.model import ORDER_REACH
@@ -53,8 +54,8 @@ def add_reason_argument(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def connected(options: argparse.Namespace) -> Iterator[tuple[zenoh.Session, str, str]]:
-    """Give a session, the team, and the operator's name.
+def connected(options: argparse.Namespace) -> Iterator[tuple[zenoh.Session, str, str, Sign]]:
+    """Give a session, the team, the operator's name, and what signs orders in that.
 
     Raises
     ------
@@ -62,14 +63,17 @@ def connected(options: argparse.Namespace) -> Iterator[tuple[zenoh.Session, str,
         If that is no id.
     WrongKeysError
         If the keys are not an operator's, or another one's.
+    FileError, MissingExtraError
+        If the keys cannot be used, or what signs is not installed.
     UnreachableError
         If no router answers for some seconds.
     """
     team, endpoints, link = connection_of(options)
     given = operator_of(link, options.name or os.environ.get(NAME_VARIABLE))
     name = check_id("operator", given or getpass.getuser().lower())
+    sign = signing(link)
     with open_session(endpoints, patience=PATIENCE, link=link) as session:
-        yield session, team, name
+        yield session, team, name, sign
 
 
 def component(text: str) -> str:

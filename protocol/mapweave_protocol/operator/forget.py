@@ -34,7 +34,7 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     robot, boot = options.runs
-    with connected(options) as (session, team, name):
+    with connected(options) as (session, team, name, sign):
         boots = _boots(session, team, robot, boot)
         if options.undo:
             orders = _undone(session, team, robot, boots, name, options.reason)
@@ -50,7 +50,7 @@ def _run(options: argparse.Namespace) -> int:
                     boots=boots,
                 )
             ]
-        deliver(session, team, orders)
+        deliver(session, team, [sign(order) for order in orders])
     for order in orders:
         done = "taken back" if options.undo else f"forgotten: {', '.join(boots)}"
         tell(options, order, f"{robot}: {done}", robot=robot, boots=boots)

@@ -51,7 +51,7 @@ def _run(options: argparse.Namespace, kind: OrderKind) -> int:
     pair = options.reference, options.other
     if options.reference == options.other:
         raise OrderError(f"{options.reference}: expected two components, given one twice")
-    with connected(options) as (session, team, name):
+    with connected(options) as (session, team, name, sign):
         if options.undo:
             orders = _undone(session, team, kind, pair, name, options.reason)
         else:
@@ -62,7 +62,7 @@ def _run(options: argparse.Namespace, kind: OrderKind) -> int:
             orders = [
                 order_between(kind, maps, meant, by=name, reason=options.reason, time=time.time())
             ]
-        deliver(session, team, orders)
+        deliver(session, team, [sign(order) for order in orders])
     for order in orders:
         done = "taken back" if options.undo else _DONE[kind]
         tell(options, order, f"{' and '.join(pair)}: {done}", components=pair)

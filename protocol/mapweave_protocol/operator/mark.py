@@ -42,13 +42,13 @@ def _configure(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     if (options.at is None) != options.undo:
         raise OrderError("expected --at SCAN or --at=X,Y, or --undo in its place")
-    with connected(options) as (session, team, name):
+    with connected(options) as (session, team, name, sign):
         if options.undo:
             orders = _undone(session, team, options, name)
         else:
             [robot_map] = maps_of(session, team, [options.robot]).values()
             orders = [_made(robot_map, options, name)]
-        deliver(session, team, orders)
+        deliver(session, team, [sign(order) for order in orders])
     for order in orders:
         on = options.robot if options.undo else order.ends[0].component
         done = "taken back" if options.undo else f"marked on {on}"

@@ -34,6 +34,7 @@ from mapweave_protocol.wire.model import (
 MAX_ORDERS = 4096  # of a team
 MAX_BOOTS = 64  # of a robot that are forgotten at once
 DIGEST_SIZE = 8  # [bytes]
+MAX_CERTIFICATE, MAX_SIGNATURE = 2048, 128  # [bytes]; those of mapweave keys take some 600 and 72
 _ENDS = {OrderKind.MARK: 1, OrderKind.PIN: 2, OrderKind.FORBID: 2, OrderKind.FORGET: 0}
 
 Kind = Annotated[OrderKind, Field(strict=False)]  # on the wire it is its name
@@ -64,6 +65,21 @@ class WireEnd(WireModel):
         return Anchor(self.submap, self.scan)
 
 
+class OrderSignature(WireModel):
+    """What proves who gave an order (`mapweave_protocol.link.security.signatures`).
+
+    Attributes
+    ----------
+    certificate
+        Of whoever signed it: X.509, as DER.
+    signature
+        Over all else that the order says: ECDSA with SHA-256, as DER.
+    """
+
+    certificate: Annotated[bytes, Field(min_length=1, max_length=MAX_CERTIFICATE)]
+    signature: Annotated[bytes, Field(min_length=1, max_length=MAX_SIGNATURE)]
+
+
 class OrderMessage(Message):
     """An order of an operator.
 
@@ -88,6 +104,8 @@ class OrderMessage(Message):
         Of a mark.
     robot, boots
         Whose runs, and which, are to be forgotten.
+    signature
+        What proves who gave it; missing in a team without keys.
     """
 
     letter: ClassVar[bytes] = b"o"
@@ -105,6 +123,7 @@ class OrderMessage(Message):
     label: Label | None = None
     robot: Id | None = None
     boots: tuple[Id, ...] = Field(default=(), max_length=MAX_BOOTS)
+    signature: OrderSignature | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
