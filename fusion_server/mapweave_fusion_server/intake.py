@@ -10,7 +10,7 @@ from typing import TypeVar
 from mapweave.maps import JointMap, RobotMap
 from mapweave_fusion_server.coordinator import Coordinator
 from mapweave_fusion_server.early import EarlyAlignment, EarlyAlignments
-from mapweave_fusion_server.journal import record
+from mapweave_fusion_server.journal import Bounded, record
 from mapweave_fusion_server.store import Store
 from mapweave_fusion_server.web.feed import RobotReport
 from mapweave_protocol.errors import MessageError
@@ -109,6 +109,7 @@ class Intake:
         self._too_large: set[str] = set()
         self._warned_of_orders = False
         self._attendance = Attendance(None, story)
+        self._comings = Bounded("who comes and goes")
         self._looked = 0.0  # [s] by the clock of `look`
         self._met = False
 
@@ -126,7 +127,7 @@ class Intake:
             Whether a router is connected: where our own link is away, nobody else need be.
         """
         self._looked = now
-        record(self._attendance.look(now, linked=linked))
+        record(self._comings.told(self._attendance.look(now, linked=linked), now))
 
     @property
     def refused(self) -> int:
@@ -195,7 +196,8 @@ class Intake:
         elif (presence := read_presence(arrival, self.refusals)) is not None:
             self._note(presence.robot)
             self._met |= presence.here
-            record(self._attendance.robot(presence, self._looked))
+            lines = self._attendance.robot(presence, self._looked)
+            record(self._comings.told(lines, self._looked))
 
     def _takes_what_was_said(self, arrival: Arrival, received: float) -> bool:
         """Take marks and orders; return whether `arrival` was any."""

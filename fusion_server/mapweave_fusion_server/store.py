@@ -175,7 +175,10 @@ class Store:
 
     def versions_since(self, number: int) -> Iterator[bytes]:
         """Yield the messages of all versions after `number`, oldest first, one at a time."""
-        for wanted in range(max(number + 1, self.oldest_version, 1), self.latest_version + 1):
+        sql = "SELECT number FROM version WHERE number > ? ORDER BY number"
+        stored = [int(wanted) for (wanted,) in self._database.rows(sql, number)]
+        held = [wanted for wanted in self._held.versions if wanted > number]
+        for wanted in (*stored, *held):
             message = self.version(wanted)
             if message is not None:
                 yield message

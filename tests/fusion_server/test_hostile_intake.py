@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from mapweave_fusion_server.coordinator import (
 )
 from mapweave_fusion_server.early import MOST
 from mapweave_fusion_server.intake import ASKED_AFTER, FAR, Intake
+from mapweave_fusion_server.journal import INTERVAL, MOST_LINES
 from mapweave_fusion_server.store import Store
 from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.guard import strangers
@@ -184,6 +186,21 @@ def test_invented_names_keep_nobody_out_and_are_forgotten(
     assert hearing.coordinator.version_of("b", "first") == 1
     assert len(hearing.story.robots) <= strangers.MOST + 2
     assert {"a", "b"} <= hearing.story.robots.keys()
+
+
+def test_who_comes_and_goes_fills_no_log(
+    hearing: Hearing, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A minute has so many lines, and the next one says how many were left out."""
+    caplog.set_level(logging.INFO)
+    for number in range(1000):
+        hearing.presence(f"x{number}", "boot")
+    assert len(caplog.records) == MOST_LINES
+    hearing.intake.look(2 * INTERVAL, linked=True)
+    hearing.presence("late", "boot")
+    left_out, late = (record.getMessage() for record in caplog.records[MOST_LINES:])
+    assert left_out == f"{1000 - MOST_LINES} more lines about who comes and goes were left out"
+    assert late.startswith("late")
 
 
 def test_invented_runs_of_a_robot_are_bounded(hearing: Hearing, make_map: MakeMap) -> None:

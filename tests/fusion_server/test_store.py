@@ -46,6 +46,18 @@ def test_everything_is_still_there_after_a_restart(path: Path) -> None:
         assert store.last_alignments() == [b"accepted"]
 
 
+def test_a_number_far_ahead_is_reached_in_one_step(path: Path) -> None:
+    """However it came there: to walk to it would take years."""
+    with Store(path, "rescue") as store:
+        _fill(store, 2)
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE version SET number = ? WHERE number = 2", (2**50,))
+    database.close()
+    with Store(path, "rescue") as store:
+        assert store.latest_version == 2**50
+        assert len(list(store.versions_since(0))) <= 2
+
+
 def test_two_stores_count_different_series(tmp_path: Path) -> None:
     with Store(tmp_path / "1", "rescue") as one, Store(tmp_path / "2", "rescue") as two:
         assert one.series != two.series
