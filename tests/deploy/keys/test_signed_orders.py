@@ -9,14 +9,17 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 import zenoh
 
 from mapweave.errors import FileError, MissingExtraError
+from mapweave.maps import LineMap, RobotMap, Submap, Trajectory
 from mapweave.orders import OrderKind
 from mapweave_deploy.keys.team_keys import make_keys
 from mapweave_protocol.errors import MessageError
-from mapweave_protocol.link.asking import ask_orders
+from mapweave_protocol.link.asking import ask_orders, ask_runs
+from mapweave_protocol.link.assembler import MapSender
 from mapweave_protocol.link.security.folder import KeyFolder
 from mapweave_protocol.link.security.proof import checking, signing
 from mapweave_protocol.link.security.roster import Role
@@ -29,7 +32,7 @@ from mapweave_protocol.wire.orders.order_message import WireEnd, digest_of, taki
 from tests.deploy.keys.conftest import MAPWEAVE, PATIENCE, ROSTER, keys_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from tests.deploy.keys.conftest import Connect, Router
@@ -160,8 +163,19 @@ def test_who_lacks_the_package_is_told_what_to_install(
         team.check(order())
 
 
+@pytest.fixture
+def server(router: Router, team: Team, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """Return a coordinator's process, under keys."""
+    files = ("--store", tmp_path / "store.sqlite", "--tls", team.folder / "coordinator")
+    words = ("server", "--team", TEAM, "--connect", router.endpoint, *files)
+    process = subprocess.Popen((MAPWEAVE, *words), stderr=subprocess.PIPE, text=True)
+    yield process
+    process.kill()
+    process.communicate(timeout=PATIENCE)
+
+
 def test_a_coordinator_takes_from_robots_what_operators_signed_and_nothing_else(
-    router: Router, connect: Connect, team: Team, tmp_path: Path
+    server: subprocess.Popen[str], connect: Connect, team: Team
 ) -> None:
     true = team.signed(order(), Role.OPERATOR, "ann")
     held = OrdersMessage(
@@ -172,22 +186,36 @@ def test_a_coordinator_takes_from_robots_what_operators_signed_and_nothing_else(
             true,
         )
     )
-    files = ("--store", tmp_path / "store.sqlite", "--tls", team.folder / "coordinator")
-    words = ("server", "--team", TEAM, "--connect", router.endpoint, *files)
-    server = subprocess.Popen((MAPWEAVE, *words), stderr=subprocess.PIPE, text=True)
-    try:
-        robot, viewer = connect(Role.ROBOT, "r1"), connect(Role.VIEWER, "bob")
-        key = keys.AGENT_QUERY.build(team=TEAM, robot="r1")
-        with robot.declare_queryable(key, lambda query: _answer(query, key, held)):
-            _say(robot, [one.id for one in held.orders], until=lambda: ask_orders(viewer, TEAM, 1))
-        assert ask_orders(viewer, TEAM, PATIENCE) == [true]
-        later = team.signed(order(identity="later"), Role.OPERATOR, "ann")
-        deliver(connect(Role.OPERATOR, "ann"), TEAM, [later])
-        assert ask_orders(viewer, TEAM, PATIENCE) == [true, later]
-    finally:
-        server.terminate()
-        _, said = server.communicate(timeout=PATIENCE)
+    robot, viewer = connect(Role.ROBOT, "r1"), connect(Role.VIEWER, "bob")
+    key = keys.AGENT_QUERY.build(team=TEAM, robot="r1")
+    with robot.declare_queryable(key, lambda query: _answer(query, key, held)):
+        _say(robot, [one.id for one in held.orders], until=lambda: ask_orders(viewer, TEAM, 1))
+    assert ask_orders(viewer, TEAM, PATIENCE) == [true]
+    later = team.signed(order(identity="later"), Role.OPERATOR, "ann")
+    deliver(connect(Role.OPERATOR, "ann"), TEAM, [later])
+    assert ask_orders(viewer, TEAM, PATIENCE) == [true, later]
+    server.terminate()
+    _, said = server.communicate(timeout=PATIENCE)
     assert "made-up of ann: nobody signed it" in said
+
+
+def test_commands_of_operators_sign(
+    server: subprocess.Popen[str], router: Router, connect: Connect, team: Team
+) -> None:
+    robot, viewer = connect(Role.ROBOT, "r1"), connect(Role.VIEWER, "bob")
+    submap = Submap(0, 0, np.zeros(3), LineMap.empty(), Trajectory.empty())
+    payload = MapSender().payload(RobotMap("r1", "first", 1, (submap,)))
+    deadline = time.monotonic() + PATIENCE
+    while not ask_runs(viewer, TEAM, 1) and time.monotonic() < deadline:
+        robot.put(keys.MAP.build(team=TEAM, robot="r1"), payload)
+    about = ("forget", "r1", "--reason", "fell", "--team", TEAM, "--connect", router.endpoint)
+    for words in (about, (*about, "--undo")):
+        subprocess.run((MAPWEAVE, *words, "--tls", team.folder / "operators" / "ann"), check=True)
+    held = ask_orders(viewer, TEAM, PATIENCE) or []
+    assert [one.by for one in held] == ["ann", "ann"]
+    for one in held:
+        team.check(one)
+    assert server.poll() is None
 
 
 def _answer(query: zenoh.Query, key: str, held: OrdersMessage) -> None:
