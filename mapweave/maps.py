@@ -115,8 +115,10 @@ class LineMap:
         """Return all lines and free space of `line_maps`, which share a frame, side by side."""
         if not line_maps:
             return cls.empty()
+        if len(line_maps) == 1:
+            return line_maps[0]
         counts = [int(m.polyline[-1]) + 1 if len(m.polyline) else 0 for m in line_maps]
-        offsets = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        offsets = itertools.accumulate(counts[:-1], initial=0)
         return cls(
             np.concatenate([m.segments for m in line_maps]),
             np.concatenate([m.polyline + k for m, k in zip(line_maps, offsets, strict=True)]),

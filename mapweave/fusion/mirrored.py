@@ -43,7 +43,7 @@ def if_mirrored(
     ours: PreparedMap, theirs: PreparedMap, wall: float, p: FusionParameters, look: Looking
 ) -> Alignment | None:
     """Return what `look` tells of `theirs` mirrored; None where `wall` [m] cannot be in common."""
-    maps = ours.coarse, theirs.coarse, theirs.lines.segments
+    maps = ours.coarse, theirs.coarse
     most = most_if_mirrored(*maps, p.hypotheses.coarse, p.verification)
     if most < p.mirrored_part * wall:
         return None

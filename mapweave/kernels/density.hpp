@@ -27,34 +27,40 @@ inline int64_t count_bits(uint64_t word) {
   return static_cast<int64_t>((word * 0x0101010101010101) >> 56);
 }
 
-inline Out<double> times_drawn(In<double, 2> points, In<double, 2> normals, In<double, 1> length, double radius,
-                               double min_cosine) {
-  const size_t n = points.shape(0);
-  if (points.shape(1) != 2 || normals.shape(0) != n || normals.shape(1) != 2 || length.shape(0) != n || !(radius > 0))
-    throw std::invalid_argument("points, normals (n, 2), length (n,), radius > 0 expected");
+// A sample of wall: where it is and faces, and half of what it stands for.
+struct Drawn {
+  double x, y, u, v, half;
+};
+
+// Of n samples, of which `points` and `normals` hold two numbers each.
+inline std::vector<double> times_drawn(const std::vector<double>& points, const std::vector<double>& normals,
+                                       const std::vector<double>& length, double radius, double min_cosine) {
+  const size_t n = length.size();
   const Grid grid(points.data(), n, radius);
+  std::vector<Drawn> drawn_by;  // cell by cell: what is near lies together
+  drawn_by.reserve(n);
+  for (const int64_t k : grid.order())
+    drawn_by.push_back({points[2 * k], points[2 * k + 1], normals[2 * k], normals[2 * k + 1], length[k] / 2});
   std::vector<double> times(n);
   for (size_t i = 0; i < n; ++i) {
+    const Drawn here = drawn_by[i];
     uint64_t covered = 0;
     int64_t drawn = 0;
-    const auto add = [&](int64_t k) {
-      const double dx = points(k, 0) - points(i, 0), dy = points(k, 1) - points(i, 1);
-      const double cosine = normals(k, 0) * normals(i, 0) + normals(k, 1) * normals(i, 1);
-      if (!(dx * dx + dy * dy <= radius * radius && cosine > min_cosine)) return;
-      const double along = dx * normals(i, 1) - dy * normals(i, 0), half = length(k) / 2;
-      const uint64_t part = bits(place(along - half, radius), place(along + half, radius));
-      covered |= part, drawn += count_bits(part);
-    };
     // Cells are as wide as the radius, or wider: what is near is in these nine.
-    for (int64_t ring = 0; ring < 2; ++ring) grid.around(points(i, 0), points(i, 1), ring, add);
-    times[i] = covered ? static_cast<double>(drawn) / static_cast<double>(count_bits(covered)) : 1.0;
+    grid.beside(here.x, here.y, [&](int64_t first, int64_t last) {
+      for (int64_t k = first; k < last; ++k) {
+        const Drawn& there = drawn_by[static_cast<size_t>(k)];
+        const double dx = there.x - here.x, dy = there.y - here.y;
+        const double cosine = there.u * here.u + there.v * here.v;
+        if (!(dx * dx + dy * dy <= radius * radius && cosine > min_cosine)) continue;
+        const double along = dx * here.v - dy * here.u;
+        const uint64_t part = bits(place(along - there.half, radius), place(along + there.half, radius));
+        covered |= part, drawn += count_bits(part);
+      }
+    });
+    times[grid.order()[i]] = covered ? static_cast<double>(drawn) / static_cast<double>(count_bits(covered)) : 1.0;
   }
-  return give(std::move(times), {n});
+  return times;
 }
 
 }  // namespace density
-
-inline void bind_density(nb::module_& m) {
-  m.def("times_drawn", &density::times_drawn, nb::arg("points"), nb::arg("normals"), nb::arg("length"),
-        nb::arg("radius"), nb::arg("min_cosine"));
-}

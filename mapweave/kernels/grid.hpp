@@ -81,6 +81,20 @@ class Grid : private Cells {
     for (size_t i = 0; i < count; ++i) order_[next[key[i]]++] = static_cast<int64_t>(i);
   }
 
+  // The points, by number, cell by cell.
+  const std::vector<int64_t>& order() const { return order_; }
+
+  // Calls `use(first, last)` for runs in the order that have all within a cell's side of a place, and some more.
+  template <typename F>
+  void beside(double x, double y, F&& use) const {
+    if (order_.empty()) return;
+    const int64_t column = floor_of((x - low_[0]) / cell_), row = floor_of((y - low_[1]) / cell_);
+    const int64_t left = std::max<int64_t>(column - 1, 0), right = std::min(column + 1, size_[0] - 1);
+    if (left > right) return;
+    for (int64_t j = std::max<int64_t>(row - 1, 0); j <= std::min(row + 1, size_[1] - 1); ++j)
+      use(start_[j * size_[0] + left], start_[j * size_[0] + right + 1]);
+  }
+
   // Calls `use(i)` for each point in the cells that are `ring` cells away from the one of a place;
   // returns how far [m] these are at the least.
   template <typename F>

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "motions.hpp"
 
 namespace main_directions {
 
@@ -130,6 +131,44 @@ inline Out<double> histogram(In<double, 2> segments, In<double, 1> weights, int6
   return give(std::move(found), {static_cast<size_t>(bins)});
 }
 
+// How much wall is parallel at each turn of the other map, by whole bins: the histograms' circular correlation.
+inline std::vector<double> parallel(In<double, 1> reference, In<double, 1> other) {
+  const size_t bins = reference.shape(0);
+  std::vector<double> twice(reference.data(), reference.data() + bins), sums(bins, 0.0);
+  twice.insert(twice.end(), reference.data(), reference.data() + bins);
+  for (size_t i = 0; i < bins; ++i) {
+    const double mass = other(i), *from = twice.data() + i;
+    if (mass == 0.0) continue;
+    for (size_t k = 0; k < bins; ++k) sums[k] += mass * from[k];
+  }
+  return sums;
+}
+
+// The turns, in [-pi, pi), at which most wall is parallel, the likeliest first.
+inline Out<double> likely_turns(In<double, 1> reference, In<double, 1> other, int64_t count, double separation,
+                                double least) {
+  const size_t bins = reference.shape(0);
+  if (bins < 1 || other.shape(0) != bins) throw std::invalid_argument("histograms of as many bins expected");
+  const std::vector<double> likely = parallel(reference, other);
+  const double height = least * *std::max_element(likely.begin(), likely.end());
+  std::vector<size_t> peaks;
+  for (size_t k = 0; k < bins; ++k)
+    if (likely[k] >= likely[(k + bins - 1) % bins] && likely[k] > likely[(k + 1) % bins] && likely[k] >= height)
+      peaks.push_back(k);
+  std::stable_sort(peaks.begin(), peaks.end(), [&](size_t a, size_t b) { return likely[a] > likely[b]; });
+  std::vector<double> kept;
+  const double apart = std::cos(separation);
+  for (const size_t peak : peaks) {
+    if (static_cast<int64_t>(kept.size()) >= count) break;
+    double turn = static_cast<double>(peak) * motions::kTurn / static_cast<double>(bins);
+    turn = std::fmod(turn + kPeriod, motions::kTurn) - kPeriod;
+    if (std::all_of(kept.begin(), kept.end(), [&](double each) { return std::cos(turn - each) < apart; }))
+      kept.push_back(turn);
+  }
+  const size_t n = kept.size();
+  return give(std::move(kept), {n});
+}
+
 inline Out<double> of_segments(In<double, 2> segments, In<double, 1> weights, nb::handle given) {
   const Rules rules = Rules::of(given);
   if (!(rules.bins >= 1 && rules.smoothing > 0)) throw std::invalid_argument("bins, smoothing: > 0 expected");
@@ -146,4 +185,6 @@ inline void bind_main_directions(nb::module_& m) {
   m.def("main_directions", &main_directions::of_segments, nb::arg("segments"), nb::arg("weights"), nb::arg("rules"));
   m.def("direction_histogram", &main_directions::histogram, nb::arg("segments"), nb::arg("weights"), nb::arg("bins"),
         nb::arg("period"), nb::arg("smoothing"));
+  m.def("likely_turns", &main_directions::likely_turns, nb::arg("reference"), nb::arg("other"), nb::arg("count"),
+        nb::arg("separation"), nb::arg("least"));
 }

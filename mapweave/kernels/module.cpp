@@ -4,8 +4,8 @@
 #include "clearing.hpp"
 #include "correlative.hpp"
 #include "denials.hpp"
-#include "density.hpp"
 #include "evidence.hpp"
+#include "fields.hpp"
 #include "judging.hpp"
 #include "main_directions.hpp"
 #include "marks.hpp"
@@ -40,8 +40,8 @@ NB_MODULE(_compiled, m) {
   bind_clearing(m);
   bind_correlative(m);
   bind_denials(m);
-  bind_density(m);
   bind_evidence(m);
+  bind_fields(m);
   bind_judging(m);
   bind_main_directions(m);
   bind_marks(m);

@@ -41,16 +41,37 @@ struct Pose {
 class PlaceView {
  public:
   PlaceView() : rows_(0), columns_(0), origin_{0, 0}, cell_(1) {}
-  // codes (rows, columns): what a cell says. samples (n, 4): x, y, direction in turns, metres of wall.
-  PlaceView(In<uint8_t, 2> codes, In<double, 1> origin, double cell, In<double, 2> samples)
+  // codes (rows, columns): what a cell says. Of samples: x, y, direction in turns, metres of wall.
+  PlaceView(In<uint8_t, 2> codes, In<double, 1> origin, double cell, In<double, 2> points, In<double, 1> facing,
+            In<double, 1> metres)
       : rows_(codes.shape(0)),
         columns_(codes.shape(1)),
         codes_(codes.data(), codes.data() + rows_ * columns_),
-        cell_(cell),
-        samples_(samples.data(), samples.data() + samples.shape(0) * samples.shape(1)) {
-    if (origin.shape(0) != 2 || samples.shape(1) != 4 || !(cell > 1e-3))
-      throw std::invalid_argument("origin (2,), samples (n, 4), cell above 0 expected");
+        cell_(cell) {
+    const size_t n = points.shape(0);
+    if (origin.shape(0) != 2 || points.shape(1) != 2 || facing.shape(0) != n || metres.shape(0) != n || !(cell > 1e-3))
+      throw std::invalid_argument("origin (2,), points (n, 2), facing, metres (n,), cell above 0 expected");
     origin_[0] = origin(0), origin_[1] = origin(1);
+    samples_.reserve(4 * n);
+    for (size_t k = 0; k < n; ++k)
+      samples_.insert(samples_.end(), {points(k, 0), points(k, 1), facing(k), metres(k)});
+  }
+
+  // The same map as a sensor has it that hangs upside down: y is -y. Its cells tell so many directions apart.
+  PlaceView mirrored(int64_t directions) const {
+    PlaceView view = *this;
+    view.origin_[1] = -origin_[1] - cell_ * static_cast<double>(columns_);
+    for (size_t i = 0; i < rows_; ++i)
+      for (size_t j = 0; j < columns_; ++j) {
+        const int64_t code = codes_[i * columns_ + columns_ - 1 - j];
+        view.codes_[i * columns_ + j] = static_cast<uint8_t>(code < directions ? directions - 1 - code : code);
+      }
+    for (size_t k = 0; k < view.samples_.size(); k += 4) {
+      double* sample = view.samples_.data() + k;
+      sample[1] = -sample[1];
+      sample[2] = -sample[2] - std::floor(-sample[2]);
+    }
+    return view;
   }
 
   // What the walls of `other`, every `stride`th sample, count in this map, at the pose of it.
@@ -220,8 +241,10 @@ class PlaceViews {
 inline void bind_place_views(nb::module_& m) {
   using namespace place_views;
   nb::class_<PlaceView>(m, "PlaceView")
-      .def(nb::init<In<uint8_t, 2>, In<double, 1>, double, In<double, 2>>(), nb::arg("codes"), nb::arg("origin"),
-           nb::arg("cell"), nb::arg("samples"));
+      .def(nb::init<In<uint8_t, 2>, In<double, 1>, double, In<double, 2>, In<double, 1>, In<double, 1>>(),
+           nb::arg("codes"), nb::arg("origin"), nb::arg("cell"), nb::arg("points"), nb::arg("facing"),
+           nb::arg("metres"))
+      .def("mirrored", &PlaceView::mirrored, nb::arg("directions"));
   nb::class_<PlaceViews>(m, "PlaceViews")
       .def(nb::init<>())
       .def("add", &PlaceViews::add, nb::arg("view"))

@@ -11,18 +11,15 @@
 #include <vector>
 
 #include "arrays.hpp"
+#include "motions.hpp"
 
 namespace proposals {
 
-constexpr double kTurn = 6.283185307179586476925286766559;
-constexpr double kHalfTurn = kTurn / 2;
-constexpr double kRounding = 1e-9;  // by which a square root may differ from hypot, amply
+using motions::kHalfTurn;
+using motions::kTurn;
+using motions::wrap;
 
-// In (-pi, pi].
-inline double wrap(double angle) {
-  const double apart = std::fmod(kHalfTurn - angle, kTurn);
-  return kHalfTurn - (apart < 0 ? apart + kTurn : apart);
-}
+constexpr double kRounding = 1e-9;  // by which a square root may differ from hypot, amply
 
 // Pairs of walls, each a corner: their numbers, and the angle from the first's direction to the second's.
 inline std::tuple<Out<int64_t>, Out<int64_t>, Out<double>> corner_pairs(In<double, 2> walls, double max_gap,
@@ -255,15 +252,16 @@ inline std::tuple<Out<int64_t>, Out<int64_t>, Out<double>, Out<double>, Out<doub
           give(std::move(peaks.transform), {n, 3}), give(std::move(peaks.residual), {n})};
 }
 
-// Numbers of the best, each different from the better ones.
-inline Out<int64_t> distinct(In<double, 2> place, In<double, 1> turn, In<double, 1> scores, int64_t count,
+// Numbers of the best, each different from the better ones at `middle`.
+inline Out<int64_t> distinct(In<double, 2> transforms, In<double, 1> scores, In<double, 1> middle, int64_t count,
                              double distance, double angle) {
   const size_t n = scores.shape(0);
-  if (place.shape(0) != n || place.shape(1) != 2 || turn.shape(0) != n)
-    throw std::invalid_argument("place (n, 2), turn (n,), scores (n,) expected");
+  if (transforms.shape(0) != n || transforms.shape(1) != 3 || middle.shape(0) != 2)
+    throw std::invalid_argument("transforms (n, 3), scores (n,), middle (2,) expected");
   for (size_t k = 0; k < n; ++k)
     if (std::isnan(scores(k))) throw std::invalid_argument("scores: numbers expected");
   std::vector<int64_t> heap(n), kept;
+  std::vector<motions::Motion> there;  // where those kept put the middle
   std::iota(heap.begin(), heap.end(), 0);
   const auto worse = [&](int64_t a, int64_t b) { return scores(a) != scores(b) ? scores(a) < scores(b) : a > b; };
   std::make_heap(heap.begin(), heap.end(), worse);
@@ -271,11 +269,13 @@ inline Out<int64_t> distinct(In<double, 2> place, In<double, 1> turn, In<double,
     std::pop_heap(heap.begin(), heap.end(), worse);
     const int64_t k = heap.back();
     heap.pop_back();
-    const bool differs = std::all_of(kept.begin(), kept.end(), [&](int64_t o) {
-      return std::hypot(place(k, 0) - place(o, 0), place(k, 1) - place(o, 1)) > distance ||
-             std::abs(wrap(turn(k) - turn(o))) > angle;
+    const double turn = transforms(k, 2), c = std::cos(turn), s = std::sin(turn);
+    const motions::Motion here{transforms(k, 0) + (c * middle(0) - s * middle(1)),
+                               transforms(k, 1) + (s * middle(0) + c * middle(1)), turn};
+    const bool differs = std::all_of(there.begin(), there.end(), [&](const motions::Motion& o) {
+      return std::hypot(here.x - o.x, here.y - o.y) > distance || std::abs(wrap(here.theta - o.theta)) > angle;
     });
-    if (differs) kept.push_back(k);
+    if (differs) kept.push_back(k), there.push_back(here);
   }
   const size_t m = kept.size();
   return give(std::move(kept), {m});
@@ -291,6 +291,6 @@ inline void bind_proposals(nb::module_& m) {
   m.def("alike_windows", &proposals::alike_windows, nb::arg("product"), nb::arg("straight"),
         nb::arg("other_straight"), nb::arg("place"), nb::arg("other_place"), nb::arg("points"),
         nb::arg("other_points"), nb::arg("min_similarity"), nb::arg("min_gain"));
-  m.def("distinct", &proposals::distinct, nb::arg("place"), nb::arg("turn"), nb::arg("scores"), nb::arg("count"),
-        nb::arg("distance"), nb::arg("angle"));
+  m.def("distinct", &proposals::distinct, nb::arg("transforms"), nb::arg("scores"), nb::arg("middle"),
+        nb::arg("count"), nb::arg("distance"), nb::arg("angle"));
 }

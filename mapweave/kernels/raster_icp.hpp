@@ -7,6 +7,7 @@
 
 #include "arrays.hpp"
 #include "judging.hpp"
+#include "motions.hpp"
 
 namespace raster_icp {
 
@@ -35,23 +36,54 @@ inline std::array<double, 3> solve(const std::array<double, 6>& a, const std::ar
   return {(y0 - l10 * z1 - l20 * z2) / l00, z1, z2};
 }
 
-inline Out<double> align_on_raster(In<double, 2> points, In<double, 2> normals, In<double, 2> poses,
+// Some samples about their middle, so that turning and shifting do not hinder each other.
+struct Moving {
+  std::vector<double> points, normals;
+  double x = 0, y = 0;
+
+  // So many of them at the most.
+  Moving(In<double, 2> all, In<double, 2> facing, size_t most) {
+    const size_t n = all.shape(0), stride = n > most ? 1 + (n - 1) / most : 1;
+    for (size_t k = 0; k < n; k += stride) {
+      points.insert(points.end(), {all(k, 0), all(k, 1)});
+      normals.insert(normals.end(), {facing(k, 0), facing(k, 1)});
+      x += all(k, 0), y += all(k, 1);
+    }
+    const double count = static_cast<double>(std::max<size_t>(size(), 1));
+    x /= count, y /= count;
+    for (size_t k = 0; k < points.size(); k += 2) points[k] -= x, points[k + 1] -= y;
+  }
+
+  size_t size() const { return points.size() / 2; }
+};
+
+// The same motion of coordinates less (x, y).
+inline void about(double* pose, double x, double y) {
+  const double c = std::cos(pose[2]), s = std::sin(pose[2]);
+  pose[0] = pose[0] + c * x - s * y, pose[1] = pose[1] + s * x + c * y, pose[2] = motions::wrap(pose[2]);
+}
+
+inline Out<double> align_on_raster(In<double, 2> points, In<double, 2> normals, int64_t most, In<double, 2> poses,
                                    In<double, 1> scales, In<double, 2> walls, In<double, 2> facing,
                                    In<int32_t, 2> nearest, In<double, 1> origin, double cell, double min_cosine,
-                                   double damping) {
+                                   double held) {
   check_oriented(points, normals);
   check_oriented(walls, facing);
-  if (poses.shape(1) != 3 || !(damping > 0)) throw std::invalid_argument("poses (k, 3), damping > 0 expected");
+  if (poses.shape(1) != 3 || !(held > 0) || most < 1)
+    throw std::invalid_argument("poses (k, 3), most >= 1, held > 0 expected");
   const Cells cells = cells_of(nearest, origin, cell, walls.shape(0));
+  const Moving moving(points, normals, static_cast<size_t>(most));
+  const double damping = held * static_cast<double>(std::max<size_t>(moving.size(), 1));
   std::vector<double> moved(poses.data(), poses.data() + poses.size());
   for (size_t p = 0; p < poses.shape(0); ++p) {
     double* pose = moved.data() + 3 * p;
+    about(pose, moving.x, moving.y);
     for (size_t round = 0; round < scales.shape(0); ++round) {
       const double scale = scales(round), reach = 9 * scale * scale, c = std::cos(pose[2]), s = std::sin(pose[2]);
       std::array<double, 6> a{damping, 0, 0, damping, 0, damping};
       std::array<double, 3> g{};
-      for (size_t k = 0; k < points.shape(0); ++k) {
-        const double *q = points.data() + 2 * k, *m = normals.data() + 2 * k;
+      for (size_t k = 0; k < moving.points.size(); k += 2) {
+        const double *q = moving.points.data() + k, *m = moving.normals.data() + k;
         const double ax = c * q[0] - s * q[1], ay = s * q[0] + c * q[1];
         const int64_t at = cells.at(ax + pose[0], ay + pose[1]);
         if (at < 0) continue;
@@ -75,6 +107,7 @@ inline Out<double> align_on_raster(In<double, 2> points, In<double, 2> normals, 
       const auto step = solve(a, g);
       for (int d = 0; d < 3; ++d) pose[d] -= step[d];
     }
+    about(pose, -moving.x, -moving.y);
   }
   return give(std::move(moved), {poses.shape(0), 3});
 }
@@ -82,7 +115,7 @@ inline Out<double> align_on_raster(In<double, 2> points, In<double, 2> normals, 
 }  // namespace raster_icp
 
 inline void bind_raster_icp(nb::module_& m) {
-  m.def("align_on_raster", &raster_icp::align_on_raster, nb::arg("points"), nb::arg("normals"), nb::arg("poses"),
-        nb::arg("scales"), nb::arg("walls"), nb::arg("facing"), nb::arg("nearest"), nb::arg("origin"),
-        nb::arg("cell"), nb::arg("min_cosine"), nb::arg("damping"));
+  m.def("align_on_raster", &raster_icp::align_on_raster, nb::arg("points"), nb::arg("normals"), nb::arg("most"),
+        nb::arg("poses"), nb::arg("scales"), nb::arg("walls"), nb::arg("facing"), nb::arg("nearest"),
+        nb::arg("origin"), nb::arg("cell"), nb::arg("min_cosine"), nb::arg("held"));
 }

@@ -10,6 +10,7 @@
 namespace rasters {
 
 constexpr int32_t kNone = -(1 << 30);  // farther than any row
+constexpr size_t kAtOnce = 16;  // cells that are looked at together: most are near no wall
 
 // The nearest seed so far, row `i` and above: its row.
 MAPWEAVE_WIDE inline void go_down(int32_t* __restrict row, const int32_t* __restrict above,
@@ -131,16 +132,29 @@ inline std::pair<int32_t, int32_t> sides(int64_t rows, int64_t columns) {
   return {r, c};
 }
 
-// Index of, and distance to, the sample nearest to each cell.
-inline std::pair<Out<int32_t>, Out<float>> nearest_samples(In<double, 2> points, In<double, 1> origin, double cell,
-                                                           int64_t rows, int64_t columns) {
+// Where cells are: the corner of the first one, how wide they are [m], and how many.
+struct Frame {
+  double x, y, cell;
+  int32_t rows, columns;
+
+  size_t size() const { return static_cast<size_t>(rows) * columns; }
+};
+
+inline Frame frame_of(In<double, 1> origin, double cell, int64_t rows, int64_t columns) {
   const auto [r, c] = sides(rows, columns);
-  if (points.shape(1) != 2 || points.shape(0) == 0 || origin.shape(0) != 2 || !(cell > 0))
-    throw std::invalid_argument("points (n, 2), one at least, origin (2,), cell > 0 expected");
-  std::vector<int32_t> owner(static_cast<size_t>(r) * c);
+  if (origin.shape(0) != 2 || !(cell > 0)) throw std::invalid_argument("origin (2,), cell > 0 expected");
+  return {origin(0), origin(1), cell, r, c};
+}
+
+// Index of, and distance to, the sample nearest to each cell.
+inline std::pair<std::vector<int32_t>, std::vector<float>> nearest_samples(const std::vector<double>& points,
+                                                                           const Frame& frame) {
+  const int32_t r = frame.rows, c = frame.columns;
+  std::vector<int32_t> owner(frame.size());
   std::vector<uint8_t> seeds(owner.size(), 0);
-  for (size_t k = 0; k < points.shape(0); ++k) {
-    const double x = std::floor((points(k, 0) - origin(0)) / cell), y = std::floor((points(k, 1) - origin(1)) / cell);
+  for (size_t k = 0; 2 * k < points.size(); ++k) {
+    const double x = std::floor((points[2 * k] - frame.x) / frame.cell);
+    const double y = std::floor((points[2 * k + 1] - frame.y) / frame.cell);
     if (!(x >= 0 && y >= 0 && x < r && y < c)) throw std::invalid_argument("points: inside of the raster expected");
     const size_t at = static_cast<size_t>(x) * c + static_cast<size_t>(y);
     owner[at] = static_cast<int32_t>(k);
@@ -151,11 +165,10 @@ inline std::pair<Out<int32_t>, Out<float>> nearest_samples(In<double, 2> points,
   Distances(r, c).find(
       seeds.data(),
       [&](size_t at, size_t count, size_t seed) { std::fill_n(nearest.begin() + at, count, owner[seed]); },
-      [&, c = c](int32_t i, const double* squared) {
-        measure(metres.data() + static_cast<size_t>(i) * c, squared, c, cell);
+      [&](int32_t i, const double* squared) {
+        measure(metres.data() + static_cast<size_t>(i) * c, squared, c, frame.cell);
       });
-  return {give(std::move(nearest), {owner.size() / c, static_cast<size_t>(c)}),
-          give(std::move(metres), {owner.size() / c, static_cast<size_t>(c)})};
+  return {std::move(nearest), std::move(metres)};
 }
 
 // Marks the cells whose centres are inside of a polygon: in each row between an odd crossing and the next.
@@ -192,20 +205,17 @@ class Filling {
   std::vector<std::pair<int32_t, int32_t>> crossings_;
 };
 
-inline std::vector<uint8_t> fill(In<double, 2> corners, In<int64_t, 1> starts, In<double, 1> origin, double cell,
-                                 int32_t rows, int32_t columns) {
-  const size_t n = corners.shape(0);
-  if (corners.shape(1) != 2 || origin.shape(0) != 2 || !(cell > 0) || starts.shape(0) < 1 || starts(0) != 0 ||
-      starts(starts.shape(0) - 1) != static_cast<int64_t>(n))
-    throw std::invalid_argument("corners (n, 2), starts (k + 1,) from 0 to n, origin (2,), cell > 0 expected");
-  std::vector<uint8_t> filled(static_cast<size_t>(rows) * columns, 0);
-  Filling filling(rows, columns, filled);
+using Rings = std::vector<In<double, 2>>;
+
+inline std::vector<uint8_t> fill(const Rings& rings, const Frame& frame) {
+  std::vector<uint8_t> filled(frame.size(), 0);
+  Filling filling(frame.rows, frame.columns, filled);
   std::vector<std::pair<double, double>> polygon;
-  for (size_t p = 0; p + 1 < starts.shape(0); ++p) {
-    if (starts(p + 1) < starts(p)) throw std::invalid_argument("starts: ascending expected");
+  for (const auto& corners : rings) {
+    if (corners.shape(1) != 2) throw std::invalid_argument("polygons (k, 2) expected");
     polygon.clear();
-    for (int64_t k = starts(p); k < starts(p + 1); ++k) {
-      const double x = (corners(k, 0) - origin(0)) / cell - 0.5, y = (corners(k, 1) - origin(1)) / cell - 0.5;
+    for (size_t k = 0; k < corners.shape(0); ++k) {
+      const double x = (corners(k, 0) - frame.x) / frame.cell - 0.5, y = (corners(k, 1) - frame.y) / frame.cell - 0.5;
       if (!(std::isfinite(x) && std::isfinite(y))) throw std::invalid_argument("corners: finite numbers expected");
       polygon.emplace_back(x, y);
     }
@@ -214,22 +224,21 @@ inline std::vector<uint8_t> fill(In<double, 2> corners, In<int64_t, 1> starts, I
   return filled;
 }
 
-inline Out<uint8_t> filled_cells(In<double, 2> corners, In<int64_t, 1> starts, In<double, 1> origin, double cell,
-                                 int64_t rows, int64_t columns) {
-  const auto [r, c] = sides(rows, columns);
+inline Out<uint8_t> filled_cells(const Rings& polygons, In<double, 1> origin, double cell, int64_t rows,
+                                 int64_t columns) {
+  const Frame frame = frame_of(origin, cell, rows, columns);
   std::vector<uint8_t> filled;
   {
     const nb::gil_scoped_release others_go_on;
-    filled = fill(corners, starts, origin, cell, r, c);
+    filled = fill(polygons, frame);
   }
-  return give(std::move(filled), {static_cast<size_t>(r), static_cast<size_t>(c)});
+  return give(std::move(filled), {static_cast<size_t>(frame.rows), static_cast<size_t>(frame.columns)});
 }
 
 // [m] from the edge of what is filled inwards; beyond the raster nothing is.
-inline Out<float> depths(In<double, 2> corners, In<int64_t, 1> starts, In<double, 1> origin, double cell, int64_t rows,
-                         int64_t columns) {
-  const auto [r, c] = sides(rows, columns);
-  const std::vector<uint8_t> filled = fill(corners, starts, origin, cell, r, c);
+inline std::vector<float> depths(const Rings& polygons, const Frame& frame) {
+  const int32_t r = frame.rows, c = frame.columns;
+  const std::vector<uint8_t> filled = fill(polygons, frame);
   std::vector<uint8_t> empty(static_cast<size_t>(r + 2) * (c + 2), 1);
   for (int32_t i = 0; i < r; ++i)
     for (int32_t j = 0; j < c; ++j)
@@ -237,27 +246,47 @@ inline Out<float> depths(In<double, 2> corners, In<int64_t, 1> starts, In<double
   std::vector<float> depth(filled.size());
   Distances(r + 2, c + 2).find(
       empty.data(), [](size_t, size_t, size_t) {},
-      [&, r = r, c = c](int32_t i, const double* squared) {
-        if (i > 0 && i <= r) measure(depth.data() + static_cast<size_t>(i - 1) * c, squared + 1, c, cell);
+      [&](int32_t i, const double* squared) {
+        if (i > 0 && i <= r) measure(depth.data() + static_cast<size_t>(i - 1) * c, squared + 1, c, frame.cell);
       });
-  return give(std::move(depth), {static_cast<size_t>(r), static_cast<size_t>(c)});
+  return depth;
+}
+
+// What cells say that are near no wall: that they were seen through, or nothing.
+MAPWEAVE_WIDE inline void tell_space(uint8_t* __restrict codes, const float* __restrict depth, size_t count, float deep,
+                                     uint8_t nothing) {
+  for (size_t k = 0; k < count; ++k) codes[k] = static_cast<uint8_t>(nothing + (depth[k] > deep));
+}
+
+inline bool any_below(const float* values, size_t count, float limit) {
+  int any = 0;
+  for (size_t k = 0; k < count; ++k) any |= values[k] < limit;
+  return any != 0;
 }
 
 // What each cell says: where the wall near it faces, that it was seen through, or nothing.
-inline Out<uint8_t> cell_codes(In<int32_t, 2> nearest, In<float, 2> distance, In<float, 2> depth, In<uint8_t, 1> facing,
-                               double closeness, double clearance, uint8_t nothing, uint8_t seen_through) {
+inline Out<uint8_t> cell_codes(In<int32_t, 2> nearest, In<float, 2> distance, In<float, 2> depth, In<double, 1> facing,
+                               double closeness, double clearance, int64_t directions) {
+  if (directions < 1 || directions > 254) throw std::invalid_argument("1 to 254 directions expected");
   for (const auto& other : {distance, depth})
     if (other.shape(0) != nearest.shape(0) || other.shape(1) != nearest.shape(1))
       throw std::invalid_argument("nearest, distance and depth: of one shape expected");
   const float close = static_cast<float>(closeness), deep = static_cast<float>(clearance);
+  std::vector<uint8_t> faces(facing.shape(0));
+  for (size_t k = 0; k < faces.size(); ++k)
+    faces[k] = static_cast<uint8_t>(static_cast<int64_t>(facing(k) * static_cast<double>(directions)) % directions);
   std::vector<uint8_t> codes(nearest.size());
+  tell_space(codes.data(), depth.data(), codes.size(), deep, static_cast<uint8_t>(directions));
   for (size_t k = 0; k < codes.size(); ++k) {
-    codes[k] = depth.data()[k] > deep ? seen_through : nothing;
+    if (k % kAtOnce == 0 && !any_below(distance.data() + k, std::min(kAtOnce, codes.size() - k), close)) {
+      k += kAtOnce - 1;  // none of these
+      continue;
+    }
     if (!(distance.data()[k] < close)) continue;
     const int64_t sample = nearest.data()[k];
-    if (sample < 0 || sample >= static_cast<int64_t>(facing.shape(0)))
+    if (sample < 0 || sample >= static_cast<int64_t>(faces.size()))
       throw std::invalid_argument("nearest: numbers of samples expected");
-    codes[k] = facing(sample);
+    codes[k] = faces[sample];
   }
   return give(std::move(codes), {nearest.shape(0), nearest.shape(1)});
 }
@@ -265,12 +294,8 @@ inline Out<uint8_t> cell_codes(In<int32_t, 2> nearest, In<float, 2> distance, In
 }  // namespace rasters
 
 inline void bind_rasters(nb::module_& m) {
-  m.def("nearest_samples", &rasters::nearest_samples, nb::arg("points"), nb::arg("origin"), nb::arg("cell"),
+  m.def("filled_cells", &rasters::filled_cells, nb::arg("polygons"), nb::arg("origin"), nb::arg("cell"),
         nb::arg("rows"), nb::arg("columns"));
-  m.def("filled_cells", &rasters::filled_cells, nb::arg("corners"), nb::arg("starts"), nb::arg("origin"),
-        nb::arg("cell"), nb::arg("rows"), nb::arg("columns"));
   m.def("cell_codes", &rasters::cell_codes, nb::arg("nearest"), nb::arg("distance"), nb::arg("depth"),
-        nb::arg("facing"), nb::arg("closeness"), nb::arg("clearance"), nb::arg("nothing"), nb::arg("seen_through"));
-  m.def("depths", &rasters::depths, nb::arg("corners"), nb::arg("starts"), nb::arg("origin"), nb::arg("cell"),
-        nb::arg("rows"), nb::arg("columns"));
+        nb::arg("facing"), nb::arg("closeness"), nb::arg("clearance"), nb::arg("directions"));
 }

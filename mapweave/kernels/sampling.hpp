@@ -11,8 +11,14 @@ namespace sampling {
 
 constexpr double kMost = 1e8;  // samples
 
-inline std::tuple<Out<double>, Out<double>, Out<int64_t>, Out<double>> sample_lines(In<double, 2> segments,
-                                                                                    double spacing) {
+// Samples, line by line: where they are and face, of which line, and how many metres of it each stands for.
+struct LineSamples {
+  std::vector<double> points, normals;
+  std::vector<int64_t> owner;
+  std::vector<double> metres;
+};
+
+inline LineSamples samples_of(In<double, 2> segments, double spacing) {
   if (segments.shape(1) != 4 || !(spacing > 0)) throw std::invalid_argument("segments (n, 4), spacing > 0 expected");
   const size_t lines = segments.shape(0);
   std::vector<double> length(lines), count(lines);
@@ -39,8 +45,15 @@ inline std::tuple<Out<double>, Out<double>, Out<int64_t>, Out<double>> sample_li
       metres[at] = length[k] / count[k];
     }
   }
-  return {give(std::move(points), {n, 2}), give(std::move(normals), {n, 2}), give(std::move(owner), {n}),
-          give(std::move(metres), {n})};
+  return {std::move(points), std::move(normals), std::move(owner), std::move(metres)};
+}
+
+inline std::tuple<Out<double>, Out<double>, Out<int64_t>, Out<double>> sample_lines(In<double, 2> segments,
+                                                                                    double spacing) {
+  LineSamples found = samples_of(segments, spacing);
+  const size_t n = found.owner.size();
+  return {give(std::move(found.points), {n, 2}), give(std::move(found.normals), {n, 2}),
+          give(std::move(found.owner), {n}), give(std::move(found.metres), {n})};
 }
 
 // A segment in equal parts, each `spacing` long at most.

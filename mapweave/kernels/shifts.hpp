@@ -49,19 +49,6 @@ MAPWEAVE_WIDE inline void add_rows(int16_t* __restrict sums, int64_t stride, con
   }
 }
 
-MAPWEAVE_WIDE inline void add_up(int16_t* __restrict sums, const int16_t* __restrict twice,
-                                 const int16_t* __restrict once, const int16_t* __restrict other,
-                                 const int16_t* __restrict seen, size_t count) {
-  for (size_t k = 0; k < count; ++k) sums[k] = static_cast<int16_t>(2 * twice[k] + once[k] + other[k] + seen[k]);
-}
-
-// The greatest of `count` numbers, whichever their signs.
-MAPWEAVE_WIDE inline int16_t greatest(const int16_t* numbers, size_t count) {
-  int16_t most = 0, least = 0;
-  for (size_t k = 0; k < count; ++k) most = std::max(most, numbers[k]), least = std::min(least, numbers[k]);
-  return std::max<int16_t>(most, static_cast<int16_t>(-least));
-}
-
 // Adds the narrow sums to the wide ones; nothing is left in them.
 MAPWEAVE_WIDE inline void move_up(int32_t* __restrict sums, int16_t* __restrict narrow, size_t count) {
   for (size_t k = 0; k < count; ++k) sums[k] += narrow[k], narrow[k] = 0;
@@ -80,23 +67,23 @@ MAPWEAVE_WIDE inline void find_cells(int32_t* __restrict cells, const double* __
 }
 
 struct Wall {
-  int64_t row, column;
-  int facing;
+  int32_t row, column, facing;
   int32_t metres;  // [cm]
 
-  std::pair<int64_t, int64_t> block() const { return {row / kBlock, column / kBlock}; }
+  uint32_t block() const { return static_cast<uint32_t>(row / kBlock) << 16 | static_cast<uint32_t>(column / kBlock); }
 };
 
 // Memory that is kept from one turn to the next, and from call to call: to ask for it anew takes longer than to fill it.
 struct Memory {
-  std::vector<int16_t> near, seen, worth[2], narrow;
+  std::vector<int16_t> seen, worth[2], narrow;
+  std::vector<std::pair<size_t, int>> near;  // cells near a wall: their places, and where that faces
   std::vector<int32_t> sums;
   std::vector<double> metres;  // all 0 between two maps
 
   // Lets go of it where it was much.
   void release() {
     constexpr size_t kKept = size_t{1} << 20;
-    if (near.capacity() + metres.capacity() + sums.capacity() > kKept) *this = Memory();
+    if (seen.capacity() + metres.capacity() + sums.capacity() > kKept) *this = Memory();
   }
 };
 
@@ -130,7 +117,7 @@ class WideMap {
   const std::vector<Wall>& walls() const { return walls_; }
   // Rows are `stride` apart: around the map nothing is said.
   const int16_t* worth(int facing) const { return worth_.data() + facing * plane() + kBlock * stride() + kBlock; }
-  // The greatest worth, or the least, whichever its sign; 1 where nothing is said.
+  // No worth is greater, whichever its sign.
   int32_t most() const { return most_; }
   int64_t stride() const { return columns_ + kAtOnce + 2 * kBlock; }
   // From where to where a block's rows say anything, of walls anywhere in a block of theirs.
@@ -173,7 +160,7 @@ class WideMap {
   // and column.
   void count_cells(const place_views::PlaceView& view, int64_t directions, int64_t weight, Memory& memory) {
     const size_t size = static_cast<size_t>(plane());
-    memory.near.assign(kFacings * size, 0);
+    memory.near.clear();
     memory.seen.assign(size, 0);
     used_.assign(static_cast<size_t>(rows_ / kBlock + 2), {columns_, 0});
     std::vector<int> facings(directions);
@@ -198,18 +185,24 @@ class WideMap {
         auto& [first, last] = used_[i_there / kBlock];
         first = std::min(first, j_there), last = std::max(last, j_there + kBlock);
         if (code > directions)
-          memory.seen[place] = static_cast<int16_t>(memory.seen[place] - 2 * weight);
+          count(memory.seen[place], -2 * weight);
         else
-          ++memory.near[facings[code] * size + place];
+          memory.near.emplace_back(place, facings[code]);
       }
     }
     for (size_t b = used_.size() - 1; b > 0; --b)  // walls further down in their block
       used_[b] = {std::min(used_[b].first, used_[b - 1].first), std::max(used_[b].second, used_[b - 1].second)};
     worth_.resize(kFacings * size);
-    const auto near = [&](int f) { return memory.near.data() + (f & (kFacings - 1)) * size; };
-    for (int f = 0; f < kFacings; ++f)
-      add_up(worth_.data() + f * size, near(f), near(f + 1), near(f - 1), memory.seen.data(), size);
-    most_ = std::max<int32_t>(greatest(worth_.data(), worth_.size()), 1);
+    for (int f = 0; f < kFacings; ++f) std::copy(memory.seen.begin(), memory.seen.end(), worth_.begin() + f * size);
+    for (const auto& [place, f] : memory.near)
+      for (const int aside : {-1, 0, 1})
+        count(worth_[((f + aside) & (kFacings - 1)) * size + place], aside == 0 ? 2 : 1);
+  }
+
+  // Worth only falls where something was seen through, and then only rises: what is met on the way tells the most.
+  void count(int16_t& worth, int64_t counts) {
+    worth = static_cast<int16_t>(worth + counts);
+    most_ = std::max<int32_t>(most_, std::abs(worth));
   }
 
   void collect_walls(const place_views::PlaceView& view, std::vector<double>& metres) {
@@ -222,9 +215,9 @@ class WideMap {
       const double* p = view.sample(k);
       const auto [row, column] = cell({p[0], p[1]});
       const int faces = facing(p[2]);
-      const size_t place = faces * size + static_cast<size_t>(row * columns_ + column);
+      const size_t place = static_cast<size_t>((row * columns_ + column) * kFacings + faces);
       const auto [i, j] = there(row, column);
-      places[count] = place, walls_[count] = {i, j, faces, 0};
+      places[count] = place, walls_[count] = {static_cast<int32_t>(i), static_cast<int32_t>(j), faces, 0};
       count += metres[place] == 0 && p[3] > 0;
       metres[place] += p[3];
     }
@@ -255,7 +248,7 @@ class Sums {
     narrow_.assign(sum_.size() + kAtOnce + kBlock, 0);
     add(reference, other.walls());
     add(other, reference.walls());
-    move_up(sum_.data(), narrow_.data(), sum_.size());
+    move_all();
   }
 
   int64_t columns() const { return columns_; }
@@ -313,17 +306,25 @@ class Sums {
     int64_t row = walls[0].row, column = walls[0].column;
     int32_t added = 0;
     for (const Wall& w : walls)
-      row = std::min(row, w.row), column = std::min(column, w.column), added += w.metres * map.most();
-    if (held_ + added > kMost) {
-      move_up(sum_.data(), narrow_.data(), sum_.size());
-      held_ = 0;
-    }
+      row = std::min<int64_t>(row, w.row), column = std::min<int64_t>(column, w.column), added += w.metres * map.most();
+    if (held_ + added > kMost) move_all();
     held_ += added;
     walls.resize(kTogether, {walls[0].row, walls[0].column, walls[0].facing, 0});
     Group group;
     for (int k = 0; k < kTogether; ++k) group.take(k, walls[k].facing, walls[k].metres, walls[k].row - row, walls[k].column - column, map);
     add_rows(narrow_.data() + row * columns_ + column, columns_, group, map.stride(), map.used());
+    touched_ = {std::min(touched_.first, row * columns_ + column),
+                std::max(touched_.second, (row + group.rows) * columns_ + column + kAtOnce + kBlock)};
     walls.clear();
+  }
+
+  // What is in the narrow sums.
+  void move_all() {
+    const int64_t size = static_cast<int64_t>(sum_.size()), last = std::min(touched_.second, size);
+    if (touched_.first < last)
+      move_up(sum_.data() + touched_.first, narrow_.data() + touched_.first, static_cast<size_t>(last - touched_.first));
+    touched_ = {size, 0};
+    held_ = 0;
   }
 
   bool is_peak(int64_t i, int64_t j) const {
@@ -341,6 +342,7 @@ class Sums {
 
   int64_t rows_, columns_;
   int32_t held_ = 0;  // no narrow sum is above it
+  Span touched_{int64_t{1} << 60, 0};  // the narrow sums that are not 0 are between
   std::vector<int32_t>& sum_;
   std::vector<int16_t>& narrow_;
 };

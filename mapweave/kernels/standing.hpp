@@ -63,11 +63,20 @@ struct Extent {
   double tall() const { return high[1] - low[1]; }
 };
 
+// Cosines and sines of the turns.
+inline const std::vector<std::pair<double, double>>& turns() {
+  static const std::vector<std::pair<double, double>> made = [] {
+    std::vector<std::pair<double, double>> all;
+    for (int turn = 0; turn < kTurns; ++turn) all.emplace_back(std::cos(turn * kTurn), std::sin(turn * kTurn));
+    return all;
+  }();
+  return made;
+}
+
 // [m] the longer side of the least rectangle around some points.
 inline double longer_side(const std::vector<std::pair<double, double>>& points) {
   double least = 1e300, longer = 0;
-  for (int turn = 0; turn < kTurns; ++turn) {
-    const double c = std::cos(turn * kTurn), s = std::sin(turn * kTurn);
+  for (const auto& [c, s] : turns()) {
     Extent extent;
     for (const auto& [x, y] : points) extent.add(x * c + y * s, y * c - x * s);
     const double area = extent.wide() * extent.tall();

@@ -4,14 +4,12 @@ A wall counts for the direction of its line, modulo pi, so that its two faces ad
 histogram modulo 2 pi keeps the visible sides apart and serves rotation hypotheses.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from mapweave.geometry.arguments import as_segments, as_values
-from mapweave.geometry.arrays import ComplexArray, FloatArray
+from mapweave.geometry.arrays import FloatArray
 from mapweave.geometry.segments import lengths
 from mapweave.kernels.lines import main_directions as kernel
 from mapweave.kernels.lines.main_directions import LINE_PERIOD, DirectionRules, line_difference
@@ -27,8 +25,9 @@ __all__ = [
     "likely_turns",
     "line_difference",
     "main_directions",
+    "mirrored_turns",
     "nearest_direction",
-    "turn_spectrum",
+    "turn_histogram",
 ]
 
 
@@ -136,17 +135,24 @@ def main_directions(
     )
 
 
-def turn_spectrum(segments: FloatArray) -> ComplexArray:
-    """Return the spectrum (181,) of the histogram of the directions of (n, 4) `segments` [m].
+def turn_histogram(segments: FloatArray) -> FloatArray:
+    """Return the histogram (360,) of the directions of (n, 4) `segments` [m].
 
     Directed, so that half a turn is not the same. Of a map compared with many it is made once.
     """
-    histogram = direction_histogram(segments, bins=TURN_BINS, period=DIRECTED_PERIOD)
-    return np.asarray(np.fft.rfft(histogram))
+    return direction_histogram(segments, bins=TURN_BINS, period=DIRECTED_PERIOD)
+
+
+def mirrored_turns(histogram: FloatArray) -> FloatArray:
+    """Return the histogram, as of `turn_histogram`, of a map of which y is -y.
+
+    What is on the left of a wall is on its right then: it runs the other way.
+    """
+    return histogram[(TURN_BINS // 2 - np.arange(TURN_BINS)) % TURN_BINS]
 
 
 def likely_turns(
-    reference: ComplexArray, other: ComplexArray, count: int, separation: float, least: float = 0.0
+    reference: FloatArray, other: FloatArray, count: int, separation: float, least: float = 0.0
 ) -> FloatArray:
     """Return the turns that make the walls of `other` parallel to those of `reference`.
 
@@ -155,7 +161,7 @@ def likely_turns(
     Parameters
     ----------
     reference, other
-        As of `turn_spectrum`.
+        As of `turn_histogram`.
     count
         How many turns at most.
     separation
@@ -168,20 +174,7 @@ def likely_turns(
     FloatArray
         (k,) [rad] in [-pi, pi), the likeliest first.
     """
-    likely = np.fft.irfft(reference * other.conj(), TURN_BINS)
-    around = np.concatenate([likely[-1:], likely, likely[:1]])
-    peaks = np.flatnonzero((likely >= around[:-2]) & (likely > around[2:]))
-    if least > 0:
-        peaks = peaks[likely[peaks] >= least * likely.max()]
-    kept: list[float] = []
-    apart = math.cos(separation)
-    for peak in peaks[np.argsort(-likely[peaks], kind="stable")].tolist():
-        if len(kept) == count:
-            break
-        turn = (peak * DIRECTED_PERIOD / TURN_BINS + math.pi) % DIRECTED_PERIOD - math.pi
-        if all(math.cos(turn - other_turn) < apart for other_turn in kept):
-            kept.append(turn)
-    return np.array(kept)
+    return kernel.likely_turns(reference, other, count, separation, least)
 
 
 def nearest_direction(angle: ArrayLike, directions: FloatArray, tolerance: float) -> FloatArray:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry.arrays import ComplexArray, FloatArray
-from mapweave.kernels.matching.place_views import Codes, PlaceView, place_view
+from mapweave.geometry.arrays import FloatArray
+from mapweave.kernels.matching.place_views import PlaceView, place_view
 from mapweave.kernels.matching.shifts import best_shifts
-from mapweave.lines.directions import likely_turns, turn_spectrum
+from mapweave.lines.directions import likely_turns, mirrored_turns, turn_histogram
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField, DistanceFieldParameters
 from mapweave.matching.field_icp import FieldIcpParameters, align_on_raster
@@ -77,21 +77,15 @@ class CoarseMap:
     ----------
     field
         Its raster.
-    codes
-        (rows, columns) what the raster's cells say, as of `verification.said_by_cells`.
-    samples
-        (n, 4) of its walls: x, y [m], where the normal points, in [0, 1) turns, and metres.
     view
-        What cells say and samples, together.
+        What the raster's cells say, as of `verification.said_by_cells`, and its samples.
     directions
-        (181,) of its walls, as of `directions.turn_spectrum`.
+        (360,) of its walls, as of `directions.turn_histogram`.
     """
 
     field: DistanceField
-    codes: Codes
-    samples: FloatArray
     view: PlaceView
-    directions: ComplexArray
+    directions: FloatArray
 
     @classmethod
     def of(
@@ -104,19 +98,10 @@ class CoarseMap:
         field = DistanceField.of(lines, p.raster)
         moved = worth_of_missing(field, verification) < 1
         metres = np.where(moved, p.moved_part, 1.0) * field.weight
-        samples = np.column_stack([field.oriented.points, field.facing, metres])
+        samples = field.oriented.points, field.facing, metres
         codes = said_by_cells(field, p.closeness, p.clearance)
-        view = place_view(codes, field.origin, field.cell, samples)
-        return cls(field, codes, samples, view, turn_spectrum(lines.segments))
-
-    def mirrored(self) -> PlaceView:
-        """Return the same view as a sensor would have it that hangs upside down: y is -y."""
-        codes = np.where(self.codes < DIRECTIONS, DIRECTIONS - 1 - self.codes, self.codes)
-        (x, y), cell = self.field.origin, self.field.cell
-        origin = np.array([x, -y - cell * codes.shape[1]])
-        samples = self.samples * np.array([1.0, -1.0, -1.0, 1.0])
-        samples[:, 2] %= 1.0
-        return place_view(np.ascontiguousarray(codes[:, ::-1]), origin, cell, samples)
+        view = place_view(codes, field.origin, field.cell, *samples)
+        return cls(field, view, turn_histogram(lines.segments))
 
 
 class CoarsePlaces(NamedTuple):
@@ -156,26 +141,18 @@ def coarse_places(
 def most_if_mirrored(
     here: CoarseMap,
     there: CoarseMap,
-    segments: FloatArray,
     parameters: CoarsePlaceParameters,
     verification: VerificationParameters,
 ) -> float:
-    """Return the most that any shift of a map, mirrored, counts in wide cells [m].
-
-    Parameters
-    ----------
-    segments
-        (n, 4) of the map `there`, which is mirrored [m].
-    """
+    """Return the most that any shift of the map `there`, mirrored, counts in wide cells [m]."""
     p = parameters
-    # What is on the left of a wall is on its right then: it runs the other way.
-    turned = turn_spectrum(segments[:, [2, 3, 0, 1]] * np.array([1.0, -1.0, 1.0, -1.0]))
-    views, turns = (here.view, there.mirrored()), _turns(here.directions, turned, p)
+    views = here.view, there.view.mirrored(DIRECTIONS)
+    turns = _turns(here.directions, mirrored_turns(there.directions), p)
     return float(_shifts(views, turns, 1, p, verification)[1].max(initial=0.0))
 
 
-def _turns(ours: ComplexArray, theirs: ComplexArray, p: CoarsePlaceParameters) -> FloatArray:
-    """(k,) [rad] at which much of two maps' wall is parallel, of the spectra of its directions."""
+def _turns(ours: FloatArray, theirs: FloatArray, p: CoarsePlaceParameters) -> FloatArray:
+    """(k,) [rad] at which much of two maps' wall is parallel, of its histograms."""
     return likely_turns(ours, theirs, p.turns, p.turn_separation, p.least_parallel)
 
 

@@ -11,9 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray
-from mapweave.kernels.lines.sampling import sample_lines
 from mapweave.kernels.matching import rasters
-from mapweave.kernels.matching.density import times_drawn
+from mapweave.kernels.matching.fields import rasterised
 from mapweave.kernels.matching.judging import Raster, Samples
 from mapweave.maps import LineMap
 from mapweave.parameters import StageParameters, derived
@@ -49,10 +48,14 @@ class DistanceField:
     ----------
     surface
         (n,) oriented samples of the walls, map frame.
-    weight
-        (n,) metres of wall that each stands for; a part of them where the wall is drawn again.
     segment
         (n,) which segment of the map each is of.
+    weight
+        (n,) metres of wall that each stands for; a part of them where the wall is drawn again.
+    facing
+        (n,) where the normal of each points, in [0, 1) turns.
+    own_depth
+        (n,) how deep each lies in the free space of its own map [m].
     origin
         (2,) the raster's corner [m].
     cell
@@ -62,7 +65,8 @@ class DistanceField:
     distance
         (rows, columns) [m] to it.
     depth
-        (rows, columns) [m] from the edge of the seen free space inwards; 0 outside of it.
+        (rows, columns) [m] from the edge of the seen free space inwards; 0 outside of it. The rim
+        is not free: what lies beyond was not looked at.
     codes
         (rows, columns) what cells say, by the limits that it hangs on; filled by what asks for it.
     missing
@@ -70,8 +74,10 @@ class DistanceField:
     """
 
     oriented: OrientedPoints
-    weight: FloatArray
     segment: IntArray
+    weight: FloatArray
+    facing: FloatArray
+    own_depth: Float32Array
     origin: FloatArray
     cell: float
     nearest: Int32Array
@@ -88,20 +94,16 @@ class DistanceField:
     def of(cls, line_map: LineMap, parameters: DistanceFieldParameters) -> "DistanceField":
         """Rasterise `line_map`, which has at least one segment."""
         p = parameters
-        points, normals, segment, step = sample_lines(line_map.segments, p.spacing)
-        oriented = OrientedPoints(points, normals, line_map.polyline[segment])
-        weight = np.minimum(1.0, line_map.support / p.full_support)[segment] * step
-        if p.same_wall > 0:
-            drawn = points, normals, step
-            weight = weight / times_drawn(*drawn, p.same_wall, p.min_cosine)
-        low = oriented.points.min(axis=0) - p.border
-        high = oriented.points.max(axis=0) + p.border
-        cell = max(p.cell, float(np.sqrt(np.prod(high - low) / p.max_cells)))
-        rows, columns = (int(n) for n in np.ceil((high - low) / cell) + 1)
-        nearest, distance = rasters.nearest_samples(oriented.points, low, cell, rows, columns)
-        # The raster's rim is not free: what lies beyond was not looked at.
-        depth = rasters.depths(line_map.free_space, low, cell, rows, columns)
-        return cls(oriented, weight, segment, low, cell, nearest, distance, depth)
+        made = rasterised(
+            line_map.segments,
+            line_map.support,
+            line_map.free_space,
+            p.spacing,
+            p.full_support,
+            *(p.same_wall, p.min_cosine, p.border, p.cell, p.max_cells),
+        )
+        polyline = line_map.polyline[made.segment]
+        return cls(OrientedPoints(made.points, made.normals, polyline), *made[2:])
 
     @cached_property
     def samples(self) -> Samples:
@@ -121,18 +123,6 @@ class DistanceField:
     def middle(self) -> FloatArray:
         """(2,) of its walls [m]."""
         return np.asarray(self.oriented.points.mean(axis=0))
-
-    @cached_property
-    def own_depth(self) -> Float32Array:
-        """(n,) how deep each sample lies in the free space of its own map [m]."""
-        i, j = ((self.oriented.points - self.origin) / self.cell).astype(np.int64).T
-        return np.asarray(self.depth[i, j])
-
-    @cached_property
-    def facing(self) -> FloatArray:
-        """(n,) where the normal of each sample points, in [0, 1) turns."""
-        normals = self.oriented.normals
-        return np.asarray(np.arctan2(normals[:, 1], normals[:, 0]) / (2 * np.pi) % 1.0)
 
     def look_up(self, points: FloatArray) -> tuple[Int32Array, Float32Array, Float32Array]:
         """Return nearest sample, distance and free depth at (..., 2) `points` [m], map frame.

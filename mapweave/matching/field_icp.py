@@ -10,11 +10,9 @@ from functools import lru_cache
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapweave.geometry import se2
 from mapweave.geometry.arrays import FloatArray
 from mapweave.kernels.matching import raster_icp as kernel
 from mapweave.matching.distance_field import DistanceField
-from mapweave.scan.points import OrientedPoints
 
 
 class FieldIcpParameters(BaseModel):
@@ -42,27 +40,18 @@ def align_on_raster(
 ) -> FloatArray:
     """Return (k, 3) `transforms` moved until the walls of `other` lie on those of `reference`."""
     p = parameters
-    stride = 1 + (len(other.weight) - 1) // p.max_samples
-    moving = other.oriented.at(slice(None, None, stride))
-    middle = moving.points.mean(axis=0)
-    # About the middle, so that turning and shifting do not hinder each other.
-    moving = OrientedPoints(moving.points - middle, moving.normals, moving.polyline)
-    moved = kernel.align_on_raster(
-        *(moving.points, np.ascontiguousarray(moving.normals), _about(transforms, middle)),
-        _scales(p),
-        *(reference.oriented.points, reference.oriented.normals, reference.nearest),
+    walls = reference.oriented
+    return kernel.align_on_raster(
+        *(other.oriented.points, other.oriented.normals),
+        p.max_samples,
+        *(transforms, _scales(p), walls.points, walls.normals),
+        reference.nearest,
         reference.origin,
-        *(reference.cell, p.min_cosine, p.damping * len(moving)),
+        *(reference.cell, p.min_cosine, p.damping),
     )
-    return _about(moved, -middle)
 
 
 @lru_cache(16)
 def _scales(p: FieldIcpParameters) -> FloatArray:
     """(iterations,) [m] residuals at which a pair's weight is a quarter."""
     return np.geomspace(p.start_scale, p.end_scale, p.iterations)
-
-
-def _about(transforms: FloatArray, middle: FloatArray) -> FloatArray:
-    """(k, 3) the same motions of coordinates less `middle` (2,)."""
-    return se2.compose(transforms, np.array([*middle.tolist(), 0.0]))

@@ -188,10 +188,5 @@ def _distinct(
     least: tuple[float, float],
 ) -> list[int]:
     """Return indices of at most `count`, best first, `least` [m], [rad] apart at `middle` (2,)."""
-    c, s = np.cos(transforms[:, 2]), np.sin(transforms[:, 2])
-    place = transforms[:, :2] + np.column_stack(
-        [c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]]
-    )
-    turn = np.ascontiguousarray(transforms[:, 2])
-    kept: list[int] = distinct(place, turn, scores, count, *least).tolist()
+    kept: list[int] = distinct(transforms, scores, middle, count, *least).tolist()
     return kept

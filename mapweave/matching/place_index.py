@@ -26,7 +26,7 @@ from mapweave.parameters import StageParameters, derived
 from mapweave.shape.words import ShapeWords, WordParameters, shape_words
 
 DIRECTIONS = 32  # of walls that views tell apart: 11° each
-NOTHING, SEEN_THROUGH = DIRECTIONS, DIRECTIONS + 1  # what a cell without a wall says
+SEEN_THROUGH = DIRECTIONS + 1  # what a cell says where space was seen through
 NOBODY = -1  # owns what was forgotten
 Key = TypeVar("Key", bound=Hashable)
 
@@ -195,22 +195,15 @@ def _view(lines: LineMap, p: PlaceIndexParameters) -> PlaceView:
     """Hold the walls and the free space of `lines` ready, in coarse cells and few samples."""
     field = DistanceField.of(lines, p.raster)
     stride = 1 + (len(field.weight) - 1) // p.samples
-    points, normals = field.oriented.points[::stride], field.oriented.normals[::stride]
     weight = field.weight[::stride] * (field.weight.sum() / field.weight[::stride].sum())
-    samples = np.column_stack([points, _turns(normals), weight])
-    return place_view(_codes(field, p.verification), field.origin, field.cell, samples)
+    samples = field.oriented.points[::stride], field.facing[::stride], weight
+    return place_view(_codes(field, p.verification), field.origin, field.cell, *samples)
 
 
 def _codes(field: DistanceField, p: VerificationParameters) -> Codes:
     """(rows, columns) what each cell says: a row of `_worth`."""
-    facing = (_turns(field.oriented.normals) * DIRECTIONS).astype(np.uint8) % DIRECTIONS
-    said = p.closeness, p.clearance, NOTHING, SEEN_THROUGH
-    return cell_codes(field.nearest, field.distance, field.depth, facing, *said)
-
-
-def _turns(normals: FloatArray) -> FloatArray:
-    """(n,) directions of unit vectors, in [0, 1) turns."""
-    return np.asarray(np.arctan2(normals[:, 1], normals[:, 0]) / (2 * np.pi) % 1.0)
+    cells = field.nearest, field.distance, field.depth, field.facing
+    return cell_codes(*cells, p.closeness, p.clearance, DIRECTIONS)
 
 
 def _worth(p: VerificationParameters) -> FloatArray:

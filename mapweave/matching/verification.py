@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from mapweave.geometry import se2
 from mapweave.geometry.arrays import BoolArray, Float32Array, FloatArray
-from mapweave.kernels.matching.judging import Limits, Weighed, judge_samples, weigh_samples
+from mapweave.kernels.matching.judging import Limits, Weighed, WeighedMap, judge_samples, weigh_maps
 from mapweave.kernels.matching.rasters import Codes, cell_codes
-from mapweave.kernels.scores import TURNS, look_up_scores
+from mapweave.kernels.scores import ScoredMap, mutual_scores
 from mapweave.maps import LineMap
 from mapweave.matching.distance_field import DistanceField
 from mapweave.matching.free_standing import free_standing
@@ -24,7 +23,6 @@ from mapweave.parameters import StageParameters, derived
 from mapweave.shape.tangent_space import complexities
 
 DIRECTIONS = 64  # that coarse scores tell apart: 5.6° each
-AT_ONCE = 20_000  # transforms scored: their samples take some 10 MB an array
 NOTHING, SEEN_THROUGH = DIRECTIONS, DIRECTIONS + 1  # what a cell without a wall says
 
 
@@ -108,32 +106,15 @@ def coarse_scores(
     parameters: VerificationParameters,
 ) -> FloatArray:
     """Return (k,) metres in common less contradicted for (k, 3) `transforms`, from few samples."""
-    scores = np.empty(len(transforms))
-    for start in range(0, len(transforms), AT_ONCE):
-        some = transforms[start : start + AT_ONCE]
-        forward = _coarse_one_way(reference, other, some, max_samples, parameters)
-        backward = _coarse_one_way(other, reference, se2.inverse(some), max_samples, parameters)
-        scores[start : start + AT_ONCE] = (forward + backward) / 2
-    return scores
+    ours, theirs = _scored(reference, parameters), _scored(other, parameters)
+    worth = _worth(parameters.min_cosine, parameters.contradiction_weight)
+    return mutual_scores(ours, theirs, transforms, max_samples, worth)
 
 
-def _coarse_one_way(
-    reference: DistanceField,
-    other: DistanceField,
-    transforms: FloatArray,
-    max_samples: int,
-    p: VerificationParameters,
-) -> FloatArray:
-    """One look-up for each sample: in single precision, as the cells are coarser than that."""
-    stride = 1 + (len(other.weight) - 1) // max_samples
-    walls = other.oriented.points, other.facing, other.weight, worth_of_missing(other, p)
-    angle = transforms[:, 2].astype(np.float32)
-    motions = np.empty((len(transforms), 5), dtype=np.float32)
-    motions[:, 0], motions[:, 1] = np.cos(angle), np.sin(angle)
-    motions[:, 2:4] = (transforms[:, :2] - reference.origin) / reference.cell
-    motions[:, 4] = angle * np.float32(DIRECTIONS / (2 * np.pi))
-    worth = _worth(p.min_cosine, p.contradiction_weight)
-    return look_up_scores(*walls, stride, motions, reference.cell, _codes(reference, p), worth)
+def _scored(raster: DistanceField, p: VerificationParameters) -> ScoredMap:
+    """Return what scores are looked up by."""
+    samples = raster.oriented.points, raster.facing, raster.weight, worth_of_missing(raster, p)
+    return ScoredMap(*samples, raster.origin, raster.cell, _codes(raster, p))
 
 
 def _codes(raster: DistanceField, p: VerificationParameters) -> Codes:
@@ -141,9 +122,8 @@ def _codes(raster: DistanceField, p: VerificationParameters) -> Codes:
     limits = p.closeness, p.clearance
     if limits not in raster.codes:
         codes = said_by_cells(raster, *limits)
-        codes[[0, -1], :] = codes[:, [0, -1]] = (
-            NOTHING  # the rim stands for all that lies beyond it
-        )
+        for rim in (codes[0], codes[-1], codes[:, 0], codes[:, -1]):
+            rim[:] = NOTHING  # it stands for all that lies beyond it
         raster.codes[limits] = codes
     return raster.codes[limits]
 
@@ -153,9 +133,8 @@ def said_by_cells(raster: DistanceField, closeness: float, clearance: float) -> 
 
     SEEN_THROUGH where space is free by more than `clearance` [m], else NOTHING.
     """
-    facing = ((raster.facing + TURNS) * DIRECTIONS).astype(np.int32) & (DIRECTIONS - 1)
-    cells = raster.nearest, raster.distance, raster.depth, facing.astype(np.uint8)
-    return cell_codes(*cells, closeness, clearance, NOTHING, SEEN_THROUGH)
+    cells = raster.nearest, raster.distance, raster.depth, raster.facing
+    return cell_codes(*cells, closeness, clearance, DIRECTIONS)
 
 
 @lru_cache(16)
@@ -250,9 +229,8 @@ def _both_ways(
     parameters: VerificationParameters,
 ) -> tuple[Weighed, Weighed]:
     """Look the samples of each map up in the other."""
-    forward = _one_way(reference, other, transform, parameters)
-    backward = _one_way(other, reference, se2.inverse(transform), parameters)
-    return forward, backward
+    p = parameters
+    return weigh_maps(_weighed(reference, p), _weighed(other, p), transform, _limits(p))
 
 
 def _tallied(forward: Weighed, backward: Weighed) -> Tally:
@@ -261,12 +239,9 @@ def _tallied(forward: Weighed, backward: Weighed) -> Tally:
     return Tally(common, contradicted)
 
 
-def _one_way(
-    reference: DistanceField, other: DistanceField, transform: FloatArray, p: VerificationParameters
-) -> Weighed:
-    """Look the samples of `other` up in `reference`."""
-    weights = other.weight, worth_of_missing(other, p)
-    return weigh_samples(other.samples, *weights, transform, reference.cells, _limits(p))
+def _weighed(raster: DistanceField, p: VerificationParameters) -> WeighedMap:
+    """Return what verdicts are looked up by."""
+    return WeighedMap(raster.samples, raster.weight, worth_of_missing(raster, p), raster.cells)
 
 
 def _limits(p: VerificationParameters) -> Limits:

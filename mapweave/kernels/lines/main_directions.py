@@ -84,6 +84,47 @@ def direction_histogram(
     return cast("FloatArray", COMPILED.direction_histogram(*given, bins, period, smoothing))
 
 
+def likely_turns_numpy(
+    reference: FloatArray, other: FloatArray, count: int, separation: float, least: float
+) -> FloatArray:
+    """Twin of `likely_turns`."""
+    bins = np.arange(len(reference))
+    likely = reference[(bins[:, None] + bins) % len(bins)] @ other
+    peaks = np.flatnonzero((likely >= np.roll(likely, 1)) & (likely > np.roll(likely, -1)))
+    peaks = peaks[likely[peaks] >= least * likely.max()]
+    kept: list[float] = []
+    for peak in peaks[np.argsort(-likely[peaks], kind="stable")].tolist():
+        turn = (peak * 2 * np.pi / len(bins) + np.pi) % (2 * np.pi) - np.pi
+        if all(np.cos(turn - each) < np.cos(separation) for each in kept):
+            kept.append(turn)
+    return np.array(kept[:count])
+
+
+def likely_turns(
+    reference: FloatArray, other: FloatArray, count: int, separation: float, least: float
+) -> FloatArray:
+    """Return (k,) turns, in [-pi, pi), at which most wall of two maps is parallel.
+
+    The likeliest first: peaks of the circular correlation of the histograms of their directions.
+
+    Parameters
+    ----------
+    reference, other
+        (bins,) histograms of a full turn.
+    count, separation
+        How many at most, and how far apart [rad].
+    least
+        Share of the parallel wall of the likeliest that each must have.
+
+    Raises
+    ------
+    ValueError
+        Where lengths do not agree.
+    """
+    compute = likely_turns_numpy if COMPILED is None else COMPILED.likely_turns
+    return cast("FloatArray", compute(reference, other, count, separation, least))
+
+
 def line_difference(first: ArrayLike, second: ArrayLike) -> FloatArray:
     """Return the turn from line direction `second` to `first` [rad], in [-pi/2, pi/2)."""
     turn = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)

@@ -9,14 +9,18 @@ from mapweave.kernels.loading import COMPILED
 
 
 def distinct_numpy(
-    place: FloatArray,
-    turn: FloatArray,
+    transforms: FloatArray,
     scores: FloatArray,
+    middle: FloatArray,
     count: int,
     distance: float,
     angle: float,
 ) -> IntArray:
     """Twin of `distinct`."""
+    turn = transforms[:, 2]
+    c, s = np.cos(turn), np.sin(turn)
+    x, y = middle
+    place = transforms[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
     kept: list[int] = []
     left = np.argsort(-scores, kind="stable")
     while len(left) and len(kept) < count:
@@ -28,9 +32,9 @@ def distinct_numpy(
 
 
 def distinct(
-    place: FloatArray,
-    turn: FloatArray,
+    transforms: FloatArray,
     scores: FloatArray,
+    middle: FloatArray,
     count: int,
     distance: float,
     angle: float,
@@ -39,17 +43,17 @@ def distinct(
 
     Parameters
     ----------
-    place
-        (n, 2) where each puts the middle of the map that is moved [m].
-    turn
-        (n,) [rad].
+    transforms
+        (n, 3) [m, m, rad].
     scores
         (n,) of equals the earlier one comes first.
+    middle
+        (2,) of the map that is moved [m].
     distance, angle
-        [m], [rad] by one of which two differ.
+        [m], [rad] by one of which two differ there.
     """
     compute = distinct_numpy if COMPILED is None else COMPILED.distinct
-    return cast("IntArray", compute(place, turn, scores, count, distance, angle))
+    return cast("IntArray", compute(transforms, scores, middle, count, distance, angle))
 
 
 def agreeing_numpy(

@@ -1,6 +1,6 @@
 """What samples of one map's walls find in the raster of another: walls, or space seen through."""
 
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,6 +63,30 @@ class Limits(NamedTuple):
     clearance: float
 
 
+class WeighedMap(NamedTuple):
+    """Samples of a map's walls, and the raster that those of another are looked up in.
+
+    Attributes
+    ----------
+    samples, weight
+        And (n,) [m] of wall that each stands for.
+    missing
+        (n,) what a metre of it counts where it was seen through.
+    raster
+        Of the same samples.
+    """
+
+    samples: Samples
+    weight: FloatArray
+    missing: FloatArray
+    raster: Raster
+
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """All of it, side by side; the samples face as the raster's do."""
+        return (*self.samples, self.weight, self.missing, *self.raster[1:])
+
+
 class Weighed(NamedTuple):
     """What samples say, summed.
 
@@ -110,50 +134,48 @@ def judge_samples(
     return coincides.view(np.bool_), through.view(np.bool_)
 
 
-def weigh_samples_numpy(
-    samples: Samples,
-    weight: FloatArray,
-    missing: FloatArray,
-    pose: FloatArray,
-    raster: Raster,
-    limits: Limits,
-) -> Weighed:
-    """Twin of `weigh_samples`."""
-    coincides, through, apart = _judged(samples, pose, raster, limits)
-    common, normals = weight[coincides], samples.normals[coincides]
-    scatter = (normals * common[:, None]).T @ normals
-    return Weighed(
-        float(common.sum()),
-        float((weight * missing)[through].sum()),
-        float(np.median(apart[coincides].astype(np.float64))) if len(common) else np.inf,
-        float(np.linalg.eigvalsh(scatter)[0]),
-    )
+def weigh_maps_numpy(
+    reference: WeighedMap, other: WeighedMap, pose: FloatArray, limits: Limits
+) -> tuple[Weighed, Weighed]:
+    """Twin of `weigh_maps`."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    x, y = pose[:2]
+    back = np.array([-c * x - s * y, s * x - c * y, -pose[2]])
+    return _weighed(other, pose, reference, limits), _weighed(reference, back, other, limits)
 
 
-def weigh_samples(
-    samples: Samples,
-    weight: FloatArray,
-    missing: FloatArray,
-    pose: FloatArray,
-    raster: Raster,
-    limits: Limits,
-) -> Weighed:
-    """Return what `judge_samples` tells, summed.
+def weigh_maps(
+    reference: WeighedMap, other: WeighedMap, pose: FloatArray, limits: Limits
+) -> tuple[Weighed, Weighed]:
+    """Return what the samples of `other` say in `reference`, summed, and the other way round.
 
     Parameters
     ----------
-    weight
-        (n,) [m] of wall that each sample stands for.
-    missing
-        (n,) what a metre of it counts where it was seen through.
+    pose
+        (3,) takes `other` into the frame of `reference` [m, m, rad].
+
+    Raises
+    ------
+    ValueError
+        Where lengths do not agree.
     """
     if COMPILED is None:
-        return weigh_samples_numpy(samples, weight, missing, pose, raster, limits)
-    points, normals, own_depth = samples
-    weighed = COMPILED.weigh_samples(
-        points, normals, weight, missing, own_depth, pose, *raster, *limits
+        return weigh_maps_numpy(reference, other, pose, limits)
+    forward, backward = COMPILED.weigh_maps(*reference.parts, *other.parts, pose, *limits)
+    return Weighed(*forward), Weighed(*backward)
+
+
+def _weighed(walls: WeighedMap, pose: FloatArray, there: WeighedMap, limits: Limits) -> Weighed:
+    """Return what the samples of `walls` say in the map `there`, summed."""
+    coincides, through, apart = _judged(walls.samples, pose, there.raster, limits)
+    common, normals = walls.weight[coincides], walls.samples.normals[coincides]
+    scatter = (normals * common[:, None]).T @ normals
+    return Weighed(
+        float(common.sum()),
+        float((walls.weight * walls.missing)[through].sum()),
+        float(np.median(apart[coincides].astype(np.float64))) if len(common) else np.inf,
+        float(np.linalg.eigvalsh(scatter)[0]),
     )
-    return Weighed(*cast("tuple[float, float, float, float]", weighed))
 
 
 def _judged(

@@ -18,12 +18,35 @@ Best = tuple[IntArray, FloatArray]
 class PlaceView(Protocol):
     """A map as both the compiled class and its twin hold it; `place_view` makes one."""
 
+    def mirrored(self, directions: int) -> "PlaceView":
+        """Return the map as a sensor has it that hangs upside down: y is -y.
+
+        Its cells tell so many `directions` apart; codes from that number on stay as they are.
+        """
+
 
 class PlaceViewNumpy:
     """Twin of the compiled class."""
 
-    def __init__(self, codes: Codes, origin: FloatArray, cell: float, samples: FloatArray) -> None:
-        self.codes, self.origin, self.cell, self.samples = codes, origin, cell, samples
+    def __init__(
+        self,
+        codes: Codes,
+        origin: FloatArray,
+        cell: float,
+        points: FloatArray,
+        facing: FloatArray,
+        metres: FloatArray,
+    ) -> None:
+        self.codes, self.origin, self.cell = codes, origin, cell
+        self.samples = np.column_stack([points, facing, metres])
+
+    def mirrored(self, directions: int) -> "PlaceViewNumpy":
+        """See `PlaceView`."""
+        codes = np.where(self.codes < directions, directions - 1 - self.codes, self.codes)
+        origin = self.origin[0], -self.origin[1] - self.cell * codes.shape[1]
+        points, (facing, metres) = self.samples[:, :2] * [1.0, -1.0], self.samples[:, 2:].T
+        cells = np.ascontiguousarray(codes[:, ::-1]), np.array(origin), self.cell
+        return PlaceViewNumpy(*cells, points, -facing % 1.0, metres)
 
     def worth(
         self, other: "PlaceViewNumpy", pose: FloatArray, table: FloatArray, stride: int
@@ -39,7 +62,14 @@ class PlaceViewNumpy:
         return float((metres[inside] * table[code, turn[inside] % table.shape[1]]).sum())
 
 
-def place_view(codes: Codes, origin: FloatArray, cell: float, samples: FloatArray) -> PlaceView:
+def place_view(
+    codes: Codes,
+    origin: FloatArray,
+    cell: float,
+    points: FloatArray,
+    facing: FloatArray,
+    metres: FloatArray,
+) -> PlaceView:
     """Hold a map ready.
 
     Parameters
@@ -50,12 +80,12 @@ def place_view(codes: Codes, origin: FloatArray, cell: float, samples: FloatArra
         (2,) the raster's corner, map frame [m].
     cell
         [m].
-    samples
-        (n, 4) of its walls: x, y [m], direction of the normal in [0, 1) turns, metres that it
-        stands for.
+    points, facing, metres
+        Of samples of its walls: (n, 2) [m]; (n,) where they face, in [0, 1) turns, and what they
+        stand for [m].
     """
     make = PlaceViewNumpy if COMPILED is None else COMPILED.PlaceView
-    return cast("PlaceView", make(codes, origin, cell, samples))
+    return cast("PlaceView", make(codes, origin, cell, points, facing, metres))
 
 
 class PlaceViews(Protocol):

@@ -11,6 +11,7 @@ from mapweave.kernels.loading import COMPILED
 def align_on_raster_numpy(
     points: FloatArray,
     normals: FloatArray,
+    most: int,
     poses: FloatArray,
     scales: FloatArray,
     walls: FloatArray,
@@ -19,12 +20,16 @@ def align_on_raster_numpy(
     origin: FloatArray,
     cell: float,
     min_cosine: float,
-    damping: float,
+    held: float,
 ) -> FloatArray:
     """Twin of `align_on_raster`: all poses at once."""
     if not points.shape == normals.shape == (len(points), 2):
         raise ValueError("points and normals: (n, 2) each expected")
-    held, (u, v) = damping * np.eye(3), normals.T
+    stride = 1 + max(len(points) - 1, 0) // most
+    middle = points[::stride].mean(axis=0) if len(points) else np.zeros(2)
+    points, normals = points[::stride] - middle, normals[::stride]
+    damping, (u, v) = held * max(len(points), 1) * np.eye(3), normals.T
+    poses = _about(poses, middle)
     for scale in scales:
         c, s = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
         x, y = points.T
@@ -41,13 +46,14 @@ def align_on_raster_numpy(
         jacobian = np.concatenate([there, lever[..., None]], axis=-1)
         weighted = (jacobian * weight[..., None]).transpose(0, 2, 1)
         gradient = weighted @ residual[..., None]
-        poses = poses - np.linalg.solve(weighted @ jacobian + held, gradient)[..., 0]
-    return poses
+        poses = poses - np.linalg.solve(weighted @ jacobian + damping, gradient)[..., 0]
+    return _about(poses, -middle)
 
 
 def align_on_raster(
     points: FloatArray,
     normals: FloatArray,
+    most: int,
     poses: FloatArray,
     scales: FloatArray,
     walls: FloatArray,
@@ -56,7 +62,7 @@ def align_on_raster(
     origin: FloatArray,
     cell: float,
     min_cosine: float,
-    damping: float,
+    held: float,
 ) -> FloatArray:
     """Return (k, 3) `poses` after one Gauss-Newton step of the robust cost at each scale.
 
@@ -64,6 +70,8 @@ def align_on_raster(
     ----------
     points, normals
         (n, 2) the moving samples [m], and where they face.
+    most
+        How many of these, at the most, are looked at.
     poses
         (k, 3) where each alignment starts [m, m, rad].
     scales
@@ -76,8 +84,8 @@ def align_on_raster(
         (2,) the raster's corner [m]; the cells' size [m].
     min_cosine
         Of the normals of a pair.
-    damping
-        Weight that holds what the walls leave open.
+    held
+        Share of the samples by whose weight is held what the walls leave open.
 
     Raises
     ------
@@ -86,8 +94,8 @@ def align_on_raster(
     """
     compute = align_on_raster_numpy if COMPILED is None else COMPILED.align_on_raster
     moved = compute(
-        *(points, normals, poses, scales, walls, facing),
-        *(nearest, origin, cell, min_cosine, damping),
+        *(points, normals, most, poses, scales, walls, facing),
+        *(nearest, origin, cell, min_cosine, held),
     )
     return cast("FloatArray", moved)
 
@@ -100,3 +108,11 @@ def _partners(
     inside: BoolArray = np.all((index >= 0) & (index < nearest.shape), axis=-1)
     index = np.where(inside[..., None], index, 0).astype(np.int64)
     return nearest[index[..., 0], index[..., 1]], inside
+
+
+def _about(poses: FloatArray, middle: FloatArray) -> FloatArray:
+    """(k, 3) the same motions of coordinates less `middle` (2,): turns and shifts apart."""
+    (x, y), turn = middle, poses[:, 2]
+    c, s = np.cos(turn), np.sin(turn)
+    wrapped = np.pi - np.mod(np.pi - turn, 2 * np.pi)
+    return np.column_stack([poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, wrapped])

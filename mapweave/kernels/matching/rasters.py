@@ -19,33 +19,15 @@ Codes = NDArray[np.uint8]
 def nearest_samples_numpy(
     points: FloatArray, origin: FloatArray, cell: float, rows: int, columns: int
 ) -> tuple[Int32Array, Float32Array]:
-    """Twin of `nearest_samples`; of samples equally near it may choose another."""
+    """Return (rows, columns) which of (n, 2) `points` is nearest to each cell, and how far it is.
+
+    Both [m]. Counted from cell to cell; of samples in one cell the last stands for all.
+    """
     index = np.floor((points - origin) / cell).astype(np.int64)
     owner = np.full((rows, columns), -1, dtype=np.int32)
     owner[index[:, 0], index[:, 1]] = np.arange(len(points))
     distance, (i, j) = scipy.ndimage.distance_transform_edt(owner < 0, return_indices=True)
     return owner[i, j], (distance * cell).astype(np.float32)
-
-
-def nearest_samples(
-    points: FloatArray, origin: FloatArray, cell: float, rows: int, columns: int
-) -> tuple[Int32Array, Float32Array]:
-    """Return (rows, columns) which sample is nearest to each cell, and how far it is [m].
-
-    Counted from cell to cell; of samples in one cell the last stands for all.
-
-    Parameters
-    ----------
-    points
-        (n, 2) samples [m], all in the raster; one at least.
-    origin
-        (2,) the raster's corner [m].
-    cell
-        [m].
-    """
-    compute = nearest_samples_numpy if COMPILED is None else COMPILED.nearest_samples
-    found = compute(points, origin, cell, rows, columns)
-    return cast("tuple[Int32Array, Float32Array]", found)
 
 
 def filled_cells_numpy(
@@ -74,46 +56,35 @@ def filled_cells(
     """
     if COMPILED is None:
         return filled_cells_numpy(polygons, origin, cell, rows, columns)
-    filled = COMPILED.filled_cells(*_joined(polygons), origin, cell, rows, columns)
+    filled = COMPILED.filled_cells(polygons, origin, cell, rows, columns)
     return cast("BoolArray", filled.view(np.bool_))
 
 
 def depths_numpy(
     polygons: Sequence[FloatArray], origin: FloatArray, cell: float, rows: int, columns: int
 ) -> Float32Array:
-    """Twin of `depths`."""
+    """Return (rows, columns) how deep each cell lies in the `polygons` [m], 0 outside of them.
+
+    What lies beyond the cells is outside.
+    """
     filled = filled_cells_numpy(polygons, origin, cell, rows, columns)
     padded = scipy.ndimage.distance_transform_edt(np.pad(filled, 1))[1:-1, 1:-1]
     return np.asarray(padded * cell, dtype=np.float32)
-
-
-def depths(
-    polygons: Sequence[FloatArray], origin: FloatArray, cell: float, rows: int, columns: int
-) -> Float32Array:
-    """Return (rows, columns) how deep each cell lies in the `polygons` [m], 0 outside of them.
-
-    What lies beyond the raster is outside.
-    """
-    if COMPILED is None:
-        return depths_numpy(polygons, origin, cell, rows, columns)
-    depth = COMPILED.depths(*_joined(polygons), origin, cell, rows, columns)
-    return cast("Float32Array", depth)
 
 
 def cell_codes_numpy(
     nearest: Int32Array,
     distance: Float32Array,
     depth: Float32Array,
-    facing: Codes,
+    facing: FloatArray,
     closeness: float,
     clearance: float,
-    nothing: int,
-    seen_through: int,
+    directions: int,
 ) -> Codes:
     """Twin of `cell_codes`."""
-    codes = np.where(depth > clearance, seen_through, nothing).astype(np.uint8)
+    codes = np.where(depth > clearance, directions + 1, directions).astype(np.uint8)
     near = distance < closeness
-    codes[near] = facing[nearest[near]]
+    codes[near] = (facing[nearest[near]] * directions).astype(np.int64) % directions
     return codes
 
 
@@ -121,16 +92,15 @@ def cell_codes(
     nearest: Int32Array,
     distance: Float32Array,
     depth: Float32Array,
-    facing: Codes,
+    facing: FloatArray,
     closeness: float,
     clearance: float,
-    nothing: int,
-    seen_through: int,
+    directions: int,
 ) -> Codes:
     """Return (rows, columns) what each cell says of a wall in it.
 
-    Where wall is within `closeness` [m], which way that faces; else `seen_through` where space is
-    free by more than `clearance` [m], or `nothing`.
+    Where wall is within `closeness` [m], which of so many `directions` it faces; else that number,
+    or one more where space is free by more than `clearance` [m].
 
     Parameters
     ----------
@@ -138,7 +108,7 @@ def cell_codes(
         (rows, columns) the sample nearest to each cell, how far it is [m], and how deep in free
         space the cell lies [m].
     facing
-        (n,) which way the samples face, by number.
+        (n,) where the samples face, in [0, 1) turns.
 
     Raises
     ------
@@ -146,16 +116,8 @@ def cell_codes(
         Where shapes do not agree.
     """
     compute = cell_codes_numpy if COMPILED is None else COMPILED.cell_codes
-    codes = compute(nearest, distance, depth, facing, closeness, clearance, nothing, seen_through)
+    codes = compute(nearest, distance, depth, facing, closeness, clearance, directions)
     return cast("Codes", codes)
-
-
-def _joined(polygons: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
-    """(n, 2) corners of all polygons, and (k + 1,) where each begins, and the last ends."""
-    starts = np.zeros(len(polygons) + 1, dtype=np.int64)
-    np.cumsum([len(polygon) for polygon in polygons], out=starts[1:])
-    corners = np.concatenate([np.empty((0, 2)), *polygons])
-    return np.ascontiguousarray(corners, dtype=np.float64), starts
 
 
 def _inside(corners: FloatArray, shape: IntArray) -> BoolArray:

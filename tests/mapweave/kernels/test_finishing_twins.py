@@ -154,23 +154,25 @@ def test_points_and_paths_are_as_deep_inside(seed: int, count: int, corners: int
     same(polygons.lengths_inside(paths, edges), polygons.lengths_inside_numpy(paths, edges))
 
 
-@settings(max_examples=40, deadline=None)
-@given(seeds, counts, counts, st.integers(1, 4))
-def test_samples_are_worth_the_same_at_many_motions(
-    seed: int, count: int, motions: int, stride: int
-) -> None:
-    rng = np.random.default_rng(seed)
+def a_scored_map(rng: np.random.Generator, count: int) -> scores.ScoredMap:
     points, (facing, weight, missing) = (
         rng.uniform(-9, 9, (count, 2)),
         rng.uniform(0, 1, (3, count)),
     )
-    angle, shift = rng.uniform(-3, 3, motions), rng.uniform(0, 20, (motions, 2))
-    moved = np.column_stack([np.cos(angle), np.sin(angle), shift, angle * 64 / (2 * np.pi)])
-    codes = rng.integers(0, 3, (20, 15), dtype=np.uint8)
-    worth = rng.normal(0, 1, (3, 64)).astype(np.float32)
-    walls = points, facing, weight, missing, stride
-    asked = *walls, moved.astype(np.float32), 0.5, codes, worth
-    same(scores.look_up_scores(*asked), scores.look_up_scores_numpy(*asked))
+    origin, codes = rng.uniform(-9, -5, 2), rng.integers(0, 3, (20, 15), dtype=np.uint8)
+    return scores.ScoredMap(points, facing, weight, missing, origin, rng.choice([0.5, 0.7]), codes)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, counts, counts, st.sampled_from([1, 7, 100]))
+def test_maps_are_worth_the_same_at_many_motions(
+    seed: int, count: int, motions: int, most: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    maps = a_scored_map(rng, count), a_scored_map(rng, 30)
+    moved = np.column_stack([rng.uniform(-9, 9, (motions, 2)), rng.uniform(-3, 3, motions)])
+    asked = *maps, moved, most, rng.normal(0, 1, (3, 64)).astype(np.float32)
+    same(scores.mutual_scores(*asked), scores.mutual_scores_numpy(*asked))
 
 
 ONE, PLACES = np.ones(1, dtype=np.int64), np.zeros((1, 2))

@@ -14,6 +14,8 @@ from mapweave.kernels.lines.evidence import near_points
 from mapweave.kernels.lines.main_directions import (
     direction_histogram,
     direction_histogram_numpy,
+    likely_turns,
+    likely_turns_numpy,
     numpy_main_directions,
 )
 from mapweave.kernels.lines.merging import NumpyEvolvingMap
@@ -216,6 +218,19 @@ def test_histograms_of_directions_are_the_same(
     np.testing.assert_allclose(
         direction_histogram(*asked), direction_histogram_numpy(*asked), atol=1e-9
     )
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, st.sampled_from([0, 1, 30]), st.sampled_from([0.0, 0.15]), st.integers(0, 16))
+def test_the_same_turns_are_likely(seed: int, count: int, least: float, most: int) -> None:
+    rng = np.random.default_rng(seed)
+    ours, theirs = np.zeros((2, 360))
+    ours[rng.integers(0, 360, count)] = theirs[rng.integers(0, 360, count)] = (
+        1.0  # whole: exact, equals among them
+    )
+    ours, theirs = ours + rng.choice([0.0, 1.0]), theirs.cumsum()
+    asked = ours, theirs, most, 0.17, least
+    np.testing.assert_allclose(likely_turns(*asked), likely_turns_numpy(*asked), atol=1e-9)
 
 
 @settings(max_examples=40, deadline=None)

@@ -10,8 +10,8 @@ from mapweave.kernels.arrays import FloatArray
 from mapweave.kernels.loading import COMPILED
 from mapweave.kernels.matching import (
     corners,
-    density,
     distinct,
+    fields,
     judging,
     marks,
     nearness,
@@ -53,35 +53,35 @@ def a_polygon(rng: np.random.Generator, corners_: int) -> FloatArray:
     return np.asarray(rng.uniform(-2, 2, 2) + rim, dtype=np.float64)
 
 
-@settings(max_examples=40, deadline=None)
-@given(seeds, some, st.sampled_from([(15, 20), (24, 33)]))
-def test_the_nearest_samples_are_as_far(seed: int, count: int, shape: tuple[int, int]) -> None:
-    points = some_places(np.random.default_rng(seed), count)
-    nearest, distance = rasters.nearest_samples(points, ORIGIN, CELL, *shape)
-    twin, apart = rasters.nearest_samples_numpy(points, ORIGIN, CELL, *shape)
-    np.testing.assert_array_equal(distance, apart)
-    cells = np.floor((points - ORIGIN) / CELL)
-    here = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
-    for owner in (nearest, twin):
-        away = np.hypot(*np.moveaxis(cells[owner] - here, -1, 0)) * CELL
-        np.testing.assert_allclose(away, distance, rtol=1e-6)
+def some_walls(rng: np.random.Generator, count: int) -> FloatArray:
+    """Lines of half a metre, many of them near each other, one without length."""
+    starts = some_places(rng, count)
+    return np.hstack([starts, starts + 0.5 * units(rng, count) * (np.arange(count) > 0)[:, None]])
 
 
-@settings(max_examples=40, deadline=None)
-@given(seeds, counts, st.sampled_from([0.05, 0.5, 3.0]))
-def test_wall_is_drawn_as_often(seed: int, count: int, radius: float) -> None:
+@settings(max_examples=60, deadline=None)
+@given(seeds, some, st.sampled_from([0.0, 0.05, 0.5, 3.0]), st.sampled_from([20, 1_000_000]))
+def test_maps_are_rasterised_alike(seed: int, count: int, same_wall: float, cells: int) -> None:
+    """Of samples equally near a cell another may be told, but no nearer one."""
     rng = np.random.default_rng(seed)
-    asked = some_places(rng, count), units(rng, count), rng.uniform(0, 1, count), radius, 0.8
-    same(density.times_drawn(*asked), density.times_drawn_numpy(*asked))
+    free = tuple(a_polygon(rng, 5) for _ in range(count % 3))
+    asked = some_walls(rng, count), rng.integers(0, 4, count), free, 0.2, 2, same_wall, 0.8, 0.7
+    found = fields.rasterised(*asked, 0.2, cells)
+    twin = fields.rasterised_numpy(*asked, 0.2, cells)
+    for name in set(found._fields) - {"nearest"}:
+        np.testing.assert_allclose(getattr(found, name), getattr(twin, name), atol=1e-9, rtol=1e-9)
+    cell = np.floor((found.points - found.origin) / found.cell)
+    here = np.stack(np.meshgrid(*map(np.arange, found.nearest.shape), indexing="ij"), axis=-1)
+    away = np.hypot(*np.moveaxis(cell[found.nearest] - here, -1, 0)) * found.cell
+    np.testing.assert_allclose(away, found.distance, rtol=1e-6)
 
 
 @settings(max_examples=40, deadline=None)
 @given(seeds, st.integers(0, 4), st.integers(3, 12))
-def test_the_same_cells_are_filled_and_as_deep(seed: int, count: int, corners_: int) -> None:
+def test_the_same_cells_are_filled(seed: int, count: int, corners_: int) -> None:
     rng = np.random.default_rng(seed)
     asked = [a_polygon(rng, corners_) for _ in range(count)], ORIGIN, CELL, 16, 21
     np.testing.assert_array_equal(rasters.filled_cells(*asked), rasters.filled_cells_numpy(*asked))
-    np.testing.assert_array_equal(rasters.depths(*asked), rasters.depths_numpy(*asked))
 
 
 @settings(max_examples=40, deadline=None)
@@ -89,7 +89,7 @@ def test_the_same_cells_are_filled_and_as_deep(seed: int, count: int, corners_: 
 def test_samples_find_the_same_in_a_raster(seed: int, count: int, walls: int, starts: int) -> None:
     rng = np.random.default_rng(seed)
     there, facing = some_places(rng, walls), units(rng, walls)
-    nearest, distance = rasters.nearest_samples(there, ORIGIN, CELL, 16, 21)
+    nearest, distance = rasters.nearest_samples_numpy(there, ORIGIN, CELL, 16, 21)
     depth = rng.uniform(0, 1, nearest.shape).astype(np.float32)
     points, normals = 1.5 * some_places(rng, count), units(rng, count)
     pose = rng.normal(0, 0.3, 3)
@@ -97,12 +97,30 @@ def test_samples_find_the_same_in_a_raster(seed: int, count: int, walls: int, st
     raster = judging.Raster(facing, nearest, distance, depth, ORIGIN, CELL)
     asked = pose, raster, judging.Limits(0.3, 0.5, 0.4)
     same(judging.judge_samples(samples, *asked), judging.judge_samples_numpy(samples, *asked))
-    weight, missing = rng.uniform(0, 1, (2, count))
-    weighed = judging.weigh_samples(samples, weight, missing, *asked)
-    same(weighed, judging.weigh_samples_numpy(samples, weight, missing, *asked))
     poses, scales = rng.normal(0, 0.3, (starts, 3)), np.geomspace(0.5, 0.1, 4)
-    moved = points, normals, poses, scales, there, facing, nearest, ORIGIN, CELL, 0.7, 0.3
-    same(raster_icp.align_on_raster(*moved), raster_icp.align_on_raster_numpy(*moved))
+    for most in (1, 7, 100):
+        moved = points, normals, most, poses, scales, there, facing, nearest, ORIGIN, CELL, 0.7, 0.3
+        same(raster_icp.align_on_raster(*moved), raster_icp.align_on_raster_numpy(*moved))
+
+
+def a_map(rng: np.random.Generator, count: int) -> judging.WeighedMap:
+    points, normals = some_places(rng, count), units(rng, count)
+    nearest, distance = rasters.nearest_samples_numpy(points, ORIGIN, CELL, 16, 21)
+    depth, own = (rng.uniform(0, 1, n).astype(np.float32) for n in (nearest.shape, count))
+    raster = judging.Raster(normals, nearest, distance, depth, ORIGIN, CELL)
+    weight, missing = rng.uniform(0, 1, (2, count))
+    return judging.WeighedMap(judging.Samples(points, normals, own), weight, missing, raster)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds, some, some)
+def test_maps_weigh_the_same_in_each_other(seed: int, one: int, two: int) -> None:
+    rng = np.random.default_rng(seed)
+    asked = a_map(rng, one), a_map(rng, two), rng.normal(0, 0.3, 3), judging.Limits(0.3, 0.5, 0.4)
+    for found, twin in zip(
+        judging.weigh_maps(*asked), judging.weigh_maps_numpy(*asked), strict=True
+    ):
+        same(tuple(found), tuple(twin))
 
 
 @settings(max_examples=40, deadline=None)
@@ -188,14 +206,15 @@ def test_maps_put_the_same_into_cells(
 def test_the_same_transforms_are_distinct(seed: int, count: int, most: int) -> None:
     rng = np.random.default_rng(seed)
     scores = rng.integers(0, 9, count).astype(np.float64)  # equals among them
-    asked = some_places(rng, count), rng.uniform(-4, 4, count), scores, most, 0.5, 0.3
+    poses = np.column_stack([some_places(rng, count), rng.uniform(-4, 4, count)])
+    asked = poses, scores, np.array([0.4, -0.3]), most, 0.5, 0.3
     np.testing.assert_array_equal(distinct.distinct(*asked), distinct.distinct_numpy(*asked))
 
 
 def test_lengths_that_do_not_agree_are_told() -> None:
     points, normals = np.zeros((3, 2)), np.zeros((2, 2))
     nearest = np.zeros((2, 2), dtype=np.int32)
-    asked = points, normals, np.zeros((1, 3)), np.ones(1), points, points, nearest
+    asked = points, normals, 9, np.zeros((1, 3)), np.ones(1), points, points, nearest
     for align in (raster_icp.align_on_raster, raster_icp.align_on_raster_numpy):
         with pytest.raises(ValueError, match="expected"):
             align(*asked, ORIGIN, CELL, 0.7, 0.3)
@@ -222,7 +241,7 @@ def test_the_same_things_stand_free(seed: int, count: int, reach: float) -> None
     """Distances of whole cells and limits of as many are told apart alike."""
     rng = np.random.default_rng(seed)
     points = np.repeat(some_places(rng, count), 5, axis=0) + rng.uniform(-0.2, 0.2, (5 * count, 2))
-    _, distance = rasters.nearest_samples(points, ORIGIN, CELL, 15, 20)
+    _, distance = rasters.nearest_samples_numpy(points, ORIGIN, CELL, 15, 20)
     for side in (0.1, 0.4, 1.1):
         asked = points, ORIGIN, CELL, distance, reach, side
         found = standing.standing_free(*asked)

@@ -63,7 +63,7 @@ def test_the_index_finds_what_its_twin_does(seed: int, count: int, budget: int) 
         np.testing.assert_allclose(a, b, atol=1e-3)
 
 
-Parts = tuple[Codes, FloatArray, float, FloatArray]
+Parts = tuple[Codes, FloatArray, float, FloatArray, FloatArray, FloatArray]
 
 
 def some_views(rng: np.random.Generator, count: int) -> list[Parts]:
@@ -73,7 +73,8 @@ def some_views(rng: np.random.Generator, count: int) -> list[Parts]:
             rng.integers(0, 5, (12, 9)).astype(np.uint8),
             rng.uniform(-2, 0, 2),
             0.2,
-            np.column_stack([rng.uniform(-1, 1, (30, 2)), rng.uniform(0, 1, (30, 2))]),
+            rng.uniform(-1, 1, (30, 2)),
+            *rng.uniform(0, 1, (2, 30)),
         )
         for _ in range(count)
     ]
@@ -172,9 +173,7 @@ def test_where_words_are_many_the_rarest_are_looked_at(make: type) -> None:
     assert found[0].tolist() == [20]
 
 
-def a_raster(
-    rng: np.random.Generator, walls: int, metres: float = 1.0
-) -> tuple[Codes, FloatArray, float, FloatArray]:
+def a_raster(rng: np.random.Generator, walls: int, metres: float = 1.0) -> Parts:
     """Return codes, origin, cell and samples of a map of 32 directions."""
     shape = rng.integers(1, 40, 2)
     codes = rng.integers(0, 34, shape).astype(np.uint8)
@@ -185,7 +184,9 @@ def a_raster(
         codes,
         origin,
         0.2,
-        np.column_stack([places, rng.random(walls), rng.uniform(0, metres, walls)]),
+        places,
+        rng.random(walls),
+        rng.uniform(0, metres, walls),
     )
 
 
@@ -205,6 +206,25 @@ def test_shifts_count_the_same(seed: int, walls: int, count: int, metres: float)
 
 
 @compiled
+@settings(max_examples=30, deadline=None)
+@given(seeds)
+def test_mirrored_maps_are_the_same(seed: int) -> None:
+    """Told by what their shifts count: upside down twice a map is as it was."""
+    assert COMPILED is not None
+    rng = np.random.default_rng(seed)
+    parts, asked = [a_raster(rng, 40) for _ in range(2)], (rng.uniform(-3, 3, 3), 0.4, 32, 5, 20)
+    ours, theirs = ([make(*m) for m in parts] for make in (COMPILED.PlaceView, PlaceViewNumpy))
+    found = COMPILED.best_shifts(ours[0], ours[1].mirrored(32), *asked)
+    twin = best_shifts_numpy(theirs[0], theirs[1].mirrored(32), *asked)
+    again = COMPILED.best_shifts(ours[0], ours[1].mirrored(32).mirrored(32), *asked)
+    for a, b in (
+        *zip(found, twin, strict=True),
+        *zip(again, COMPILED.best_shifts(*ours, *asked), strict=True),
+    ):
+        np.testing.assert_allclose(a, b, atol=1e-9, rtol=1e-9)
+
+
+@compiled
 def test_cells_too_wide_for_their_sums_are_refused() -> None:
     assert COMPILED is not None
     view = COMPILED.PlaceView(*a_raster(np.random.default_rng(1), 1))
@@ -215,8 +235,8 @@ def test_cells_too_wide_for_their_sums_are_refused() -> None:
 @compiled
 def test_walls_beyond_their_raster_are_refused_by_both() -> None:
     assert COMPILED is not None
-    codes, origin, cell, samples = a_raster(np.random.default_rng(1), 1)
-    view = codes, origin, cell, samples + np.array([100.0, 0, 0, 0])
+    codes, origin, cell, points, *walls = a_raster(np.random.default_rng(1), 1)
+    view = codes, origin, cell, points + np.array([100.0, 0]), *walls
     asked = np.zeros(1), 0.4, 32, 5, 1
     with pytest.raises(ValueError, match="inside of the raster"):
         COMPILED.best_shifts(COMPILED.PlaceView(*view), COMPILED.PlaceView(*view), *asked)
@@ -231,6 +251,5 @@ def test_cells_say_the_same(seed: int, samples: int) -> None:
     rng = np.random.default_rng(seed)
     nearest = rng.integers(0, samples, (9, 13)).astype(np.int32)
     distance, depth = rng.uniform(0, 1, (2, 9, 13)).astype(np.float32)
-    facing = rng.integers(0, 64, samples).astype(np.uint8)
-    asked = nearest, distance, depth, facing, 0.25, 0.3, 64, 65
+    asked = nearest, distance, depth, rng.uniform(0, 1, samples), 0.25, 0.3, 64
     np.testing.assert_array_equal(cell_codes(*asked), cell_codes_numpy(*asked))

@@ -18,8 +18,9 @@ from mapweave.lines.directions import (
     likely_turns,
     line_difference,
     main_directions,
+    mirrored_turns,
     nearest_direction,
-    turn_spectrum,
+    turn_histogram,
 )
 from tests.mapweave.buildings import BUILDING, part
 
@@ -152,16 +153,24 @@ def test_the_true_turn_is_among_the_likely_ones(seed: int) -> None:
     turn = rng.uniform(-np.pi, np.pi)
     halves = part(BUILDING, 0, 18).segments, part(BUILDING, 8, 30).segments
     turned = se2.transform_segments(np.array([3.0, -1.0, -turn]), halves[1])
-    found = likely_turns(turn_spectrum(halves[0]), turn_spectrum(turned), 4, 0.17)
+    found = likely_turns(turn_histogram(halves[0]), turn_histogram(turned), 4, 0.17)
     assert np.abs(se2.wrap(found - turn)).min() < np.radians(1.5)
     apart = np.abs(se2.wrap(found[:, None] - found)) + np.pi * np.eye(len(found))
     assert apart.min() > 0.17
 
 
+def test_of_a_mirrored_map_the_directions_are_told_by_those_of_the_map() -> None:
+    """Its walls run the other way: what was on their left is on their right."""
+    walls = part(BUILDING, 0, 18).segments
+    mirrored = walls[:, [2, 3, 0, 1]] * np.array([1.0, -1.0, 1.0, -1.0])
+    told = mirrored_turns(turn_histogram(walls))
+    np.testing.assert_allclose(told, turn_histogram(mirrored), atol=1e-9)
+
+
 def test_visible_sides_tell_half_a_turn_from_none() -> None:
     """Three walls of a room, seen from inside: only one turn lays them on themselves."""
     walls = np.array([[0.0, 0, 6, 0], [6, 0, 6, 4], [0, 4, 0, 0]])
-    seen, back = turn_spectrum(walls), turn_spectrum(walls[:, [2, 3, 0, 1]])
+    seen, back = turn_histogram(walls), turn_histogram(walls[:, [2, 3, 0, 1]])
     assert abs(likely_turns(seen, seen, 4, 0.17)[0]) < np.radians(1)
     assert abs(se2.wrap(likely_turns(seen, back, 4, 0.17)[0] - np.pi)) < 0.02
 

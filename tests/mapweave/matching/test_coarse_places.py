@@ -90,7 +90,7 @@ def test_a_map_of_one_wall_is_laid_along_it() -> None:
 
 def mirrored_most(reference: LineMap, other: LineMap) -> float:
     maps = [CoarseMap.of(lines, P, JUDGED) for lines in (reference, other)]
-    return most_if_mirrored(maps[0], maps[1], other.segments, P, JUDGED)
+    return most_if_mirrored(maps[0], maps[1], P, JUDGED)
 
 
 def test_what_fits_mirrored_counts_half_of_what_it_has_in_common_at_least(rng: Generator) -> None:

@@ -1,16 +1,16 @@
 """Versions built from what has changed are those that are built from nothing."""
 
-from collections.abc import Sequence
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from numpy.random import Generator
 
 from mapweave.geometry import se2
-from mapweave.geometry.arrays import Float32Array, FloatArray
-from mapweave.kernels.matching import rasters
+from mapweave.kernels.matching import fields
 from mapweave.maps import Alignment, JointMap, LineMap, RobotMap, Submap
+from mapweave.matching import distance_field
 from mapweave.reasons import Reason
 from mapweave.team import joining
 from mapweave.team.joint_builder import JointMapBuilder, OvertakenError
@@ -143,18 +143,10 @@ def test_what_did_not_change_is_not_rasterised_again(
     *others, last = maps[2].submaps
     moved = replace(last, pose=se2.compose(last.pose, STEP))
     maps[2] = replace(maps[2], submaps=(*others, moved))
-    drawn: list[int] = []
-    depths = rasters.depths
-
-    def noted(
-        polygons: Sequence[FloatArray], origin: FloatArray, cell: float, rows: int, columns: int
-    ) -> Float32Array:
-        drawn.append(1)
-        return depths(polygons, origin, cell, rows, columns)
-
-    monkeypatch.setattr(rasters, "depths", noted)
+    drawn = Mock(wraps=fields.rasterised)
+    monkeypatch.setattr(distance_field, "rasterised", drawn)
     incremental.build(maps, links, 2)
-    assert len(drawn) == 1  # the component as a whole that has moved within
+    assert drawn.call_count == 1  # the component as a whole that has moved within
 
 
 def test_a_submap_without_walls_is_woven_and_joined(rng: Generator) -> None:
