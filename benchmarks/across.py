@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.fusion import outcome_rows
+from benchmarks.logistic import calibration_error, reliability
 from benchmarks.logs import find_logs
 from benchmarks.pairs import compare
 from benchmarks.runs import COMPARING, MAPPING, sources
@@ -98,12 +99,17 @@ def _weight(alignment: dict[str, Any]) -> tuple[bool, float]:
 
 
 def tell(rows: Sequence[dict[str, Any]], of: int) -> str:
-    """Return how many pairs were decided how, and each that was joined."""
+    """Return how many pairs were decided how, how far confidences are off, and what was joined."""
     best = [max(row["alignments"], key=_weight) for row in rows if row["alignments"]]
     counts = Counter(str(each["decision"]) for each in best)
     told = ", ".join(f"{count} {decision}" for decision, count in sorted(counts.items()))
     sure = sum(float(each["confidence"]) > SURE for each in best)
     lines = [f"{len(rows)} of {of} pairs across buildings: {told}; {sure} over {SURE:.0%}"]
-    joined = [a for row in rows for a in row["alignments"] if a["decision"] == "accepted"]
+    every = [a for row in rows for a in row["alignments"]]
+    if every:
+        said = np.array([float(a["confidence"]) for a in every])
+        error = calibration_error(reliability(said, np.zeros(len(said), dtype=np.bool_)))
+        lines.append(f"  {len(every)} pairs of components: calibration error {error:.3f}")
+    joined = [a for a in every if a["decision"] == "accepted"]
     lines += [f"  joined: {a['reference']} - {a['other']}: {a['reason']}" for a in joined]
     return "\n".join(lines)

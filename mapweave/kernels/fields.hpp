@@ -7,12 +7,11 @@
 
 #include "arrays.hpp"
 #include "density.hpp"
+#include "motions.hpp"
 #include "rasters.hpp"
 #include "sampling.hpp"
 
 namespace fields {
-
-constexpr double kTurn = 6.283185307179586476925286766559;
 
 using Rasterised = std::tuple<Out<double>, Out<double>, Out<int64_t>, Out<double>, Out<double>, Out<float>, Out<double>,
                               double, Out<int32_t>, Out<float>, Out<float>>;
@@ -51,7 +50,7 @@ inline std::vector<double> facing_of(const sampling::LineSamples& samples) {
       facing[k] = facing[k - 1];
       continue;
     }
-    const double turns = std::atan2(samples.normals[2 * k + 1], samples.normals[2 * k]) / kTurn;
+    const double turns = std::atan2(samples.normals[2 * k + 1], samples.normals[2 * k]) / motions::kTurn;
     facing[k] = turns - std::floor(turns);
   }
   return facing;

@@ -46,7 +46,7 @@ class DistanceField:
 
     Attributes
     ----------
-    surface
+    oriented
         (n,) oriented samples of the walls, map frame.
     segment
         (n,) which segment of the map each is of.

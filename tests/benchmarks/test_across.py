@@ -26,3 +26,4 @@ def test_one_component_that_is_joined_makes_a_pair_joined_and_is_named() -> None
     told = tell(rows, 10)
     assert told.startswith("3 of 10 pairs across buildings: 1 accepted, 1 refused; 0 over 85%")
     assert "a/0 - b/0: so it is" in told
+    assert "3 pairs of components: calibration error 0.500" in told  # none of them can be right

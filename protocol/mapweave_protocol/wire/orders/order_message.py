@@ -34,7 +34,7 @@ from mapweave_protocol.wire.model import (
 MAX_ORDERS = 4096  # of a team
 MAX_BOOTS = 64  # of a robot that are forgotten at once
 DIGEST_SIZE = 8  # [bytes]
-MAX_CERTIFICATE, MAX_SIGNATURE = 2048, 128  # [bytes]; those of mapweave keys take some 600 and 72
+MAX_CERTIFICATE, MAX_SIGNATURE = 2048, 128  # [bytes]; those of mapweave keys take some 480 and 72
 _ENDS = {OrderKind.MARK: 1, OrderKind.PIN: 2, OrderKind.FORBID: 2, OrderKind.FORGET: 0}
 
 Kind = Annotated[OrderKind, Field(strict=False)]  # on the wire it is its name
